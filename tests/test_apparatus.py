@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -47,7 +46,7 @@ def apparatus() -> ApparatusFunction:
 
 @settings(max_examples=25)
 @given(width=st.floats(0.2e-3, 1.5e-3), load=st.floats(0.01, 100.0))
-def test_a_gaussian_convolved_with_a_gaussian_is_a_wider_gaussian(width, load) -> None:
+def test_a_gaussian_convolved_with_a_gaussian_is_a_wider_gaussian(width, load):
     apparatus = with_kernel(lambda r: unit_gaussian(r, SIGMA))
     blurred = apparatus.convolve(RADII, load * unit_gaussian(RADII, width))
     exact = load * unit_gaussian(RADII, float(np.hypot(width, SIGMA)))
@@ -72,7 +71,7 @@ def alike(apparatus) -> ApparatusFunction:
 
 
 @pytest.mark.parametrize("shape", IDEAL)
-def test_an_ideal_reference_is_predicted_by_its_closed_form(shape, alike) -> None:
+def test_an_ideal_reference_is_predicted_by_its_closed_form(shape, alike):
     size, share = IDEAL[shape]
     sensor = alike
     source = memscal.IdealReference(shape, size)
@@ -93,7 +92,7 @@ def test_an_ideal_reference_is_predicted_by_its_closed_form(shape, alike) -> Non
     np.testing.assert_allclose(over_plane, errors, atol=0.01 * errors.max())
 
 
-def test_over_the_plane_what_is_uncertain_beside_the_profile_adds_to_a_prediction(alike) -> None:
+def test_over_the_plane_what_is_uncertain_beside_the_profile_adds_to_a_prediction(alike):
     sensor = replace(alike, plane=ApparatusField.of_profile(alike.radial_profile))
     x = np.linspace(-6e-3, 6e-3, 61)
     stress = 1e3 * np.exp(-((np.hypot.outer(x, x) / 1e-3) ** 2))
@@ -114,7 +113,7 @@ def test_over_the_plane_what_is_uncertain_beside_the_profile_adds_to_a_predictio
 
 
 @pytest.mark.parametrize("place", [0.0, 0.7e-3, 2.3e-3])
-def test_the_convolution_is_the_double_integral_at_a_point(place) -> None:
+def test_the_convolution_is_the_double_integral_at_a_point(place):
     def kernel(r: Any) -> Any:
         return 1.5 * unit_gaussian(r, 0.6e-3) - 0.5 * unit_gaussian(r, 0.4e-3)
 
@@ -141,7 +140,7 @@ def elliptic(x: FloatArray, y: FloatArray, covariance: FloatArray) -> FloatArray
     return np.exp(-form / 2) / (2 * np.pi * np.sqrt(np.linalg.det(covariance)))
 
 
-def test_a_field_is_convolved_with_g_over_the_plane() -> None:
+def test_a_field_is_convolved_with_g_over_the_plane():
     sensor = np.array([[0.5, 0.2], [0.2, 0.3]]) * 1e-6
     force = np.array([[1.0, -0.6], [-0.6, 2.0]])
     axis = np.linspace(-4e-3, 4e-3, 161)
@@ -167,14 +166,14 @@ def test_a_field_is_convolved_with_g_over_the_plane() -> None:
         (np.linspace(-8e-3, 8e-3, 81), np.linspace(-8e-3, 8e-3, 81), (81,), "no field"),
     ],
 )
-def test_a_field_that_cannot_be_convolved_is_refused(apparatus, x, y, shape, problem) -> None:
+def test_a_field_that_cannot_be_convolved_is_refused(apparatus, x, y, shape, problem):
     with pytest.raises(InputError, match=problem):
         apparatus.predict(x, np.ones(shape), y=y)
 
 
 @settings(max_examples=8)
 @given(a=st.floats(-1e3, 1e3, width=16), b=st.floats(-1e3, 1e3, width=16))
-def test_the_convolution_is_linear(a: float, b: float) -> None:
+def test_the_convolution_is_linear(a, b):
     apparatus = with_kernel(lambda r: unit_gaussian(r, SIGMA))
     one = unit_gaussian(RADII, 1e-3)
     two = unit_gaussian(RADII, 0.6e-3) * (RADII / 1e-3) ** 2
@@ -192,20 +191,20 @@ def test_the_convolution_is_linear(a: float, b: float) -> None:
         ),  # where there is no stress
     ],
 )
-def test_uneven_radii_give_the_same_as_even_ones(apparatus: ApparatusFunction, uneven) -> None:
+def test_uneven_radii_give_the_same_as_even_ones(apparatus, uneven):
     found = apparatus.convolve(uneven, unit_gaussian(uneven, 0.9e-3))
     exact = unit_gaussian(uneven, float(np.hypot(0.9e-3, SIGMA)))
     np.testing.assert_allclose(found, exact, atol=1e-6 * exact[0])
 
 
-def test_a_voltage_is_the_blurred_stress_times_the_constant(apparatus: ApparatusFunction) -> None:
+def test_a_voltage_is_the_blurred_stress_times_the_constant(apparatus):
     stress = 2e5 * np.exp(-((RADII / 1e-3) ** 2))
     volts = apparatus.predict(RADII, stress)
     assert_same_to_rounding(volts, CONVERSION * apparatus.convolve(RADII, stress))
     np.testing.assert_allclose(apparatus.stress(volts), apparatus.convolve(RADII, stress))
 
 
-def test_the_radial_profile_is_that_of_the_table_between_its_radii(apparatus) -> None:
+def test_the_radial_profile_is_that_of_the_table_between_its_radii(apparatus):
     r = np.linspace(-SUPPORT, SUPPORT, 997).reshape(-1, 1)
     g = unit_gaussian(r, SIGMA)
     np.testing.assert_allclose(apparatus.radial(r), g, atol=1e-2)
@@ -230,7 +229,7 @@ def test_the_radial_profile_is_that_of_the_table_between_its_radii(apparatus) ->
         ([0.0], [1.0], "cannot be interpolated"),
     ],
 )
-def test_a_table_that_cannot_be_convolved_is_refused(apparatus, r, sigma, problem) -> None:
+def test_a_table_that_cannot_be_convolved_is_refused(apparatus, r, sigma, problem):
     for method in (apparatus.convolve, apparatus.predict):
         with pytest.raises(InputError, match=problem) as caught:
             method(r, sigma)
@@ -238,7 +237,7 @@ def test_a_table_that_cannot_be_convolved_is_refused(apparatus, r, sigma, proble
             assert "metres, not millimetres" in caught.value.cure
 
 
-def test_a_compact_artifact_is_half_as_large_and_convolves_the_same(tmp_path: Path) -> None:
+def test_a_compact_artifact_is_half_as_large_and_convolves_the_same(tmp_path):
     whole = memscal.calibrate(simulate(noise=0.005, seed=2)).apparatus
     compact = whole.compact()
     sizes = []
@@ -258,7 +257,7 @@ def test_a_compact_artifact_is_half_as_large_and_convolves_the_same(tmp_path: Pa
     np.testing.assert_allclose(read.convolve(x, stress, y=y), expected, atol=1e-5 * expected.max())
 
 
-def test_g_that_is_not_round_stays_in_a_compact_artifact() -> None:
+def test_g_that_is_not_round_stays_in_a_compact_artifact():
     apparatus = with_kernel(lambda r: unit_gaussian(r, SIGMA))
     axis = np.linspace(-SUPPORT, SUPPORT, 801)
     oval = elliptic(axis, axis, np.diag([1.01, 1 / 1.01]) * SIGMA**2)
@@ -269,7 +268,7 @@ def test_g_that_is_not_round_stays_in_a_compact_artifact() -> None:
     assert replace(apparatus, plane=of_profile).compact().plane is None
 
 
-def test_the_uncertainty_of_a_prediction_is_that_of_many_calibrations() -> None:
+def test_the_uncertainty_of_a_prediction_is_that_of_many_calibrations():
     """Predicted voltages of a sphere's stress scatter as the artifact's covariances say."""
     film = EXACT_FILM
     rod = EXACT_ROD
@@ -310,6 +309,6 @@ def test_the_uncertainty_of_a_prediction_is_that_of_many_calibrations() -> None:
         (np.zeros(2), np.zeros((2, 2)), ("m",)),
     ],
 )
-def test_parameters_that_do_not_fit_together_are_refused(values, covariance, units) -> None:
+def test_parameters_that_do_not_fit_together_are_refused(values, covariance, units):
     with pytest.raises(InputError, match="2 parameter names"):
         ParameterSet(("a", "b"), values, covariance, units)

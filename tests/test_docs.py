@@ -59,7 +59,7 @@ def stated_rows(section: str) -> list[list[str]]:
     ]
 
 
-def test_the_table_of_the_paper_s_sphere_is_what_its_script_prints() -> None:
+def test_the_table_of_the_paper_s_sphere_is_what_its_script_prints():
     stated = {(load, friction): row for load, friction, *row in stated_rows("ν = 0.5")}
     assert len(stated) == 36
     printed = sphere_table(0.5)
@@ -70,7 +70,7 @@ def test_the_table_of_the_paper_s_sphere_is_what_its_script_prints() -> None:
             assert pair(cell) == pytest.approx(pair(found), rel=7e-4)
 
 
-def test_the_comparison_with_the_paper_s_sphere_is_by_the_same_script() -> None:
+def test_the_comparison_with_the_paper_s_sphere_is_by_the_same_script():
     stated = stated_rows("Comparison with the paper")
     assert len(stated) == 9
     for load, quantity, _, *values in stated:
@@ -99,7 +99,7 @@ def kinds() -> dict[str, list[dict[str, str]]]:
         ("accuracy.md", {2: ("G (%)", 1), 5: ("A (%)", 1), 6: ("z of A", 2)}),
     ],
 )
-def test_a_page_sums_up_the_study_of_the_bayesian_estimate(page, columns, kinds) -> None:
+def test_a_page_sums_up_the_study_of_the_bayesian_estimate(page, columns, kinds):
     text = text_of(DOCS / page)
     rows = [cells_of(line) for line in text.splitlines() if line.startswith("| ")]
     found = {row[0].split(",")[0]: row for row in rows if row[0].split(",")[0] in kinds}
@@ -116,7 +116,7 @@ def cells(path: Path) -> list[tuple[str, str]]:
     return [(cell.cell_type, cell.source) for cell in jupytext.read(path).cells]
 
 
-def test_every_notebook_has_its_script_and_says_the_same() -> None:
+def test_every_notebook_has_its_script_and_says_the_same():
     scripts = {path.stem: path for path in NOTEBOOKS.glob("*.py")}
     books = {path.stem: path for path in NOTEBOOKS.glob("*.ipynb")}
     assert books
@@ -131,7 +131,7 @@ def blocks(page: str, language: str) -> list[str]:
     return re.findall(rf"^```{language}\n(.*?)^```$", text, flags=re.MULTILINE | re.DOTALL)
 
 
-def test_every_message_of_the_troubleshooting_page_is_one_that_memscal_gives() -> None:
+def test_every_message_of_the_troubleshooting_page_is_one_that_memscal_gives():
     page = text_of(DOCS / "troubleshooting.md")
     quoted = re.findall(r"^\| `(.+?)`", page, flags=re.MULTILINE)
     assert len(quoted) > 20
@@ -142,7 +142,7 @@ def test_every_message_of_the_troubleshooting_page_is_one_that_memscal_gives() -
     assert [message for message in quoted if message not in filled] == []
 
 
-def test_every_option_in_the_documentation_exists() -> None:
+def test_every_option_in_the_documentation_exists():
     unknown = []
     for page in (*DOCS.glob("*.md"), DOCS.with_name("README.md")):
         text = text_of(page).replace("\\\n", "")
@@ -164,13 +164,13 @@ def follow(page: str, run: Run) -> dict[str, Outcome]:
     return outcomes
 
 
-def test_the_page_on_tables_imports_the_shipped_ones(folder: Path, run: Run) -> None:
+def test_the_page_on_tables_imports_the_shipped_ones(folder, run):
     for table in DOCS.with_name("calibration_data").glob("tables/*.csv"):
         shutil.copy(table, folder)
     follow("import_tables.md", run)
 
 
-def test_the_page_on_incomplete_scans_calibrates_them(folder: Path, run: Run, capsys) -> None:
+def test_the_page_on_incomplete_scans_calibrates_them(folder, run, capsys):
     shutil.copy(DOCS.with_name("calibration_data") / "tables" / "rod.csv", folder)
     assert (
         "mV (relative: the load is not known)" in follow("incomplete_scan.md", run)["calibrate"].out
@@ -189,7 +189,7 @@ def run_examples(page: str) -> dict[str, object]:
     return names
 
 
-def test_the_page_on_mechanics_prints_what_it_shows(folder: Path, run: Run) -> None:
+def test_the_page_on_mechanics_prints_what_it_shows(folder, run):
     printed = follow("mechanics.md", run)["reference"].out.splitlines()
     assert (folder / "sphere.png").is_file()
     expected = blocks("mechanics.md", "text")[0].splitlines()
@@ -201,9 +201,7 @@ def test_the_page_on_mechanics_prints_what_it_shows(folder: Path, run: Run) -> N
     assert run_examples("mechanics.md")["down"].load == pytest.approx(1.37)
 
 
-def test_the_way_from_contacts_to_friction_prints_what_is_shown(
-    folder: Path, run: Run, monkeypatch
-) -> None:
+def test_the_way_from_contacts_to_friction_prints_what_is_shown(folder, run, monkeypatch):
     """The whole chain, from files only; unless in full, by fewer contacts in one process."""
     if not FULL:
         monkeypatch.setattr(os, "cpu_count", lambda: 1)
@@ -225,7 +223,7 @@ def test_the_way_from_contacts_to_friction_prints_what_is_shown(
     assert run_examples("friction.md")["comparison"].joint["dry"]["total"].interval.low < 0.1
 
 
-def test_the_page_on_plans_finds_the_repeats_that_it_names(folder: Path, run: Run) -> None:
+def test_the_page_on_plans_finds_the_repeats_that_it_names(folder, run):
     for line in blocks("plan_a_scan.md", "console")[1].splitlines():
         outcome = run(*shlex.split(line)[1:], "--json").exits(0)
     assert outcome.json["plan"]["repeats"] == 8
@@ -233,19 +231,19 @@ def test_the_page_on_plans_finds_the_repeats_that_it_names(folder: Path, run: Ru
     assert run_examples("plan_a_scan.md")["enough"].plan.repeats > 1
 
 
-def test_the_examples_of_the_page_on_python_run(folder: Path) -> None:
+def test_the_examples_of_the_page_on_python_run(folder):
     shutil.copytree(DOCS.with_name("calibration_data"), folder / "calibration_data")
     names = run_examples("api.md")
     assert names["apparatus"].gaussian_sigma == pytest.approx(561e-6, rel=0.05)
     assert names["sigma"] == pytest.approx(561e-6, rel=0.05)
 
 
-def test_the_citation_names_the_version() -> None:
+def test_the_citation_names_the_version():
     citation = text_of(DOCS.with_name("CITATION.cff"))
     assert f"\nversion: {memscal.__version__}\n" in citation
 
 
-def test_every_public_name_has_an_example_that_runs_and_a_place_in_the_reference() -> None:
+def test_every_public_name_has_an_example_that_runs_and_a_place_in_the_reference():
     # The doctests of docstrings run where they stand.
     public = {name: getattr(memscal, name) for name in memscal.__all__ if name[0] != "_"}
     own = {name: thing for name, thing in public.items() if not isinstance(thing, UnionType)}
@@ -254,7 +252,7 @@ def test_every_public_name_has_an_example_that_runs_and_a_place_in_the_reference
     assert sorted(listed) == sorted(public)
 
 
-def test_pages_teach_public_names_only() -> None:
+def test_pages_teach_public_names_only():
     rooms = [path.name for path in Path(memscal.__path__[0]).iterdir() if path.is_dir()]
     private = re.compile(rf"(?<!click:: )\bmemscal\.({'|'.join(rooms)})\.")
     pages = [*DOCS.glob("*.md"), DOCS.with_name("README.md")]
@@ -262,7 +260,7 @@ def test_pages_teach_public_names_only() -> None:
     assert found == []
 
 
-def test_every_page_can_be_reached_from_the_start_page() -> None:
+def test_every_page_can_be_reached_from_the_start_page():
     start = text_of(DOCS / "index.md")
     linked = set(re.findall(r"\]\((\w+\.md)", start))
     trees = "".join(blocks("index.md", "{toctree}"))
@@ -271,7 +269,7 @@ def test_every_page_can_be_reached_from_the_start_page() -> None:
     assert (linked, in_tree) == (written, written)
 
 
-def test_a_page_is_read_in_minutes() -> None:
+def test_a_page_is_read_in_minutes():
     pages = {page: len(text_of(page).split()) for page in DOCS.glob("*.md")}
     front = [len(text_of(DOCS.with_name(name)).split()) for name in FRONT]
     assert {page.name: count for page, count in pages.items() if count > 1200} == {}
@@ -279,7 +277,7 @@ def test_a_page_is_read_in_minutes() -> None:
     assert sum(pages.values()) + sum(front) <= 39_200
 
 
-def test_the_methods_of_the_page_on_a_method_of_ones_own_calibrate(monkeypatch, capsys) -> None:
+def test_the_methods_of_the_page_on_a_method_of_ones_own_calibrate(monkeypatch, capsys):
     monkeypatch.chdir(DOCS.with_name("calibration_data"))
     monkeypatch.setattr("memscal.calibration.drawn_scatter.draw_count", lambda _: 3)
     names = run_examples("own_method.md")
@@ -290,8 +288,8 @@ def test_the_methods_of_the_page_on_a_method_of_ones_own_calibrate(monkeypatch, 
 
 @pytest.mark.filterwarnings("ignore:It is not known whether this device:FutureWarning")  # drivers
 def test_the_recipe_with_pymeasure_records_a_scan_that_can_be_calibrated(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, seed: int
-) -> None:
+    tmp_path, monkeypatch, seed
+):
     monkeypatch.chdir(tmp_path)
     scan = simulate(points=33, noise=0.0)
     bench = Bench(scan, noise=0.005 * scan.u_zz.max(), seed=seed)
@@ -309,7 +307,7 @@ def test_the_recipe_with_pymeasure_records_a_scan_that_can_be_calibrated(
         assert abs(found[name] - scan.synthetic[name]) < 5 * found.uncertainty(name)
 
 
-def test_notebooks_are_stored_with_outputs_and_nothing_of_a_machine() -> None:
+def test_notebooks_are_stored_with_outputs_and_nothing_of_a_machine():
     books = {book: text_of(book) for book in NOTEBOOKS.glob("*.ipynb")}
     for book, text in books.items():
         assert text.count('"image/png": "') > 3, book.name
@@ -320,7 +318,7 @@ def test_notebooks_are_stored_with_outputs_and_nothing_of_a_machine() -> None:
     assert sum(len(text) for text in books.values()) < 2e6
 
 
-def test_every_picture_is_there_with_words_and_made_by_a_command_or_script_of_the_page() -> None:
+def test_every_picture_is_there_with_words_and_made_by_a_command_or_script_of_the_page():
     readme = text_of(DOCS.with_name("README.md"))
     page = text_of(DOCS / "gallery.md")
     shown = re.findall(r"!\[(.+)\]\(images/([\w-]+)\.png\)", page)

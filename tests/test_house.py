@@ -151,7 +151,7 @@ def arrows(trees: dict[str, ast.Module]) -> dict[str, set[str]]:
     }
 
 
-def test_imports_point_only_to_earlier_rooms(arrows: dict[str, set[str]]) -> None:
+def test_imports_point_only_to_earlier_rooms(arrows):
     wrong = []
     for name, others in arrows.items():
         rooms = {room(other) for other in others}
@@ -159,7 +159,7 @@ def test_imports_point_only_to_earlier_rooms(arrows: dict[str, set[str]]) -> Non
     assert wrong == []
 
 
-def test_an_extension_imports_no_other_one_but_those_that_the_table_names(arrows) -> None:
+def test_an_extension_imports_no_other_one_but_those_that_the_table_names(arrows):
     wrong = []
     for name, others in arrows.items():
         own = extension(name)
@@ -168,7 +168,7 @@ def test_an_extension_imports_no_other_one_but_those_that_the_table_names(arrows
     assert wrong == []
 
 
-def test_the_table_names_what_there_is() -> None:
+def test_the_table_names_what_there_is():
     for name, (module, _) in extensions.COMMANDS.items():
         assert extensions.module(module).command.name == name
     for summary, figure in extensions.VIEWS.values():
@@ -181,7 +181,7 @@ def test_the_table_names_what_there_is() -> None:
         assert callable(extensions.hook(name))
 
 
-def test_public_names_are_those_that_the_stub_states_for_type_checkers() -> None:
+def test_public_names_are_those_that_the_stub_states_for_type_checkers():
     stub = (PACKAGE / "__init__.pyi").read_text(encoding="utf-8")
     stated = re.findall(r"^from \.([\w.]+) import (\w+) as \2$", stub, re.MULTILINE)
     held = [(module, name) for module, names in memscal.PUBLIC.items() for name in names]
@@ -189,7 +189,7 @@ def test_public_names_are_those_that_the_stub_states_for_type_checkers() -> None
     assert sorted(memscal.__all__) == sorted(name for _, name in held)
 
 
-def test_each_library_stays_in_its_room(trees: dict[str, ast.Module]) -> None:
+def test_each_library_stays_in_its_room(trees):
     wrong = [
         (name, library)
         for name, tree in trees.items()
@@ -199,7 +199,7 @@ def test_each_library_stays_in_its_room(trees: dict[str, ast.Module]) -> None:
     assert wrong == []
 
 
-def test_slow_libraries_are_imported_only_when_needed(trees: dict[str, ast.Module]) -> None:
+def test_slow_libraries_are_imported_only_when_needed(trees):
     wrong = []
     for name, tree in trees.items():
         at_once = [node for node in tree.body if isinstance(node, ast.Import | ast.ImportFrom)]
@@ -210,7 +210,7 @@ def test_slow_libraries_are_imported_only_when_needed(trees: dict[str, ast.Modul
     assert wrong == []
 
 
-def test_no_modules_import_each_other_in_a_circle(arrows: dict[str, set[str]]) -> None:
+def test_no_modules_import_each_other_in_a_circle(arrows):
     left = dict(arrows)
     while free := [name for name in left if not left[name] & set(left)]:
         for name in free:
@@ -218,7 +218,7 @@ def test_no_modules_import_each_other_in_a_circle(arrows: dict[str, set[str]]) -
     assert {name: sorted(left[name] & set(left)) for name in left} == {}
 
 
-def test_a_name_stands_for_one_thing(trees: dict[str, ast.Module]) -> None:
+def test_a_name_stands_for_one_thing(trees):
     owners: dict[str, list[str]] = {}
     for name in trees:
         if room(name) not in ONE_ROLE and not name.endswith("__init__"):
@@ -226,7 +226,7 @@ def test_a_name_stands_for_one_thing(trees: dict[str, ast.Module]) -> None:
     assert {name: found for name, found in owners.items() if len(found) > 1} == NAMESAKES
 
 
-def test_no_module_merely_hands_names_on(trees: dict[str, ast.Module]) -> None:
+def test_no_module_merely_hands_names_on(trees):
     own = (ast.FunctionDef, ast.ClassDef, ast.Assign, ast.AnnAssign)
     idle = []
     for name in (name for name in trees if not name.endswith(("__init__", "__main__"))):
@@ -235,13 +235,13 @@ def test_no_module_merely_hands_names_on(trees: dict[str, ast.Module]) -> None:
     assert idle == []
 
 
-def test_no_public_name_is_hidden_by_a_module_of_that_name() -> None:
+def test_no_public_name_is_hidden_by_a_module_of_that_name():
     # Importing memscal.indent, were there such a module, would replace the function memscal.indent.
     at_the_top = {room(name) for name in MODULES}
     assert at_the_top.isdisjoint(memscal.__all__)
 
 
-def test_the_map_of_the_house_has_a_line_for_every_room() -> None:
+def test_the_map_of_the_house_has_a_line_for_every_room():
     contributing = TESTS.parent / "CONTRIBUTING.md"
     lines = re.findall(r"^- `([\w/.]+)`: ", contributing.read_text(encoding="utf-8"), re.MULTILINE)
     folders = {path.parent for path in PACKAGE.rglob("__init__.py")} - {PACKAGE}
@@ -265,7 +265,7 @@ def within(budget: dict[str, int], found: Counter[str]) -> list[str]:
     ]
 
 
-def test_each_room_and_extension_keeps_to_its_budget_of_tokens(read) -> None:
+def test_each_room_and_extension_keeps_to_its_budget_of_tokens(read):
     core = Counter[str]()
     extended = Counter[str]()
     for name, counted in read.items():
@@ -276,7 +276,7 @@ def test_each_room_and_extension_keeps_to_its_budget_of_tokens(read) -> None:
     assert within(BUDGET["core"], core) + within(BUDGET["extensions"], extended) == []
 
 
-def test_the_package_is_light_and_not_dense(read) -> None:
+def test_the_package_is_light_and_not_dense(read):
     total = sum(read.values(), Counter[str]())
     limits = BUDGET["package"]
     core = sum(counted["tokens"] for name, counted in read.items() if not extension(name))
@@ -290,7 +290,7 @@ def test_the_package_is_light_and_not_dense(read) -> None:
     assert len(memscal.__all__) <= limits["public_names"]
 
 
-def test_the_tests_are_lighter_than_the_package(read) -> None:
+def test_the_tests_are_lighter_than_the_package(read):
     total = sum((measures(path) for path in TESTS.rglob("*.py")), Counter[str]())
     package = sum(counted["tokens"] for counted in read.values())
     assert total["tokens"] <= BUDGET["tests"]["share_of_package"] * package

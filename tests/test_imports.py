@@ -58,22 +58,22 @@ sys.exit(main())
 """
 
 
-def test_importing_the_package_loads_only_its_lazy_loader() -> None:
+def test_importing_the_package_loads_only_its_lazy_loader():
     assert libraries_after("import memscal") == {"lazy_loader", "memscal"}
 
 
 @pytest.mark.parametrize("arguments", ["'--help'", "'--version'", "'calibrate', '--help'"])
-def test_asking_for_help_loads_click_alone(arguments: str) -> None:
+def test_asking_for_help_loads_click_alone(arguments):
     assert libraries_after(HELP.format(arguments=arguments)) == {"click", "lazy_loader", "memscal"}
 
 
-def test_calibrating_is_possible_without_the_libraries_of_other_jobs() -> None:
+def test_calibrating_is_possible_without_the_libraries_of_other_jobs():
     loaded = libraries_after("import memscal; memscal.calibrate, memscal.read_scan")
     assert loaded.isdisjoint({"matplotlib", "meshio", "pint", "skfem", "skimage"})
 
 
 @pytest.mark.parametrize("arguments", [["--help"], ["calibrate", SCAN, "-o", "artifact.h5"]])
-def test_help_and_a_plain_calibration_load_no_extension(arguments: list[str], tmp_path) -> None:
+def test_help_and_a_plain_calibration_load_no_extension(arguments, tmp_path):
     listing = "print([m for m in sys.modules if m.startswith('memscal.extensions.')])"
     code = f"import sys; from memscal.cli import main; main({arguments!r}); {listing}"
     run = subprocess.run(
@@ -105,7 +105,7 @@ def offered(public: Any) -> Iterator[Any]:
             yield get_type_hints(function, localns=names).get("return")
 
 
-def test_every_type_that_a_public_name_offers_is_public() -> None:
+def test_every_type_that_a_public_name_offers_is_public():
     hidden = {
         offer.__name__
         for name in memscal.__all__

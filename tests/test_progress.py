@@ -17,7 +17,7 @@ def told(heard: list[memscal.Progress]) -> list[tuple[str, float, float]]:
     return [(one.task, one.done, one.total) for one in heard]
 
 
-def test_only_the_outermost_task_is_told_of() -> None:
+def test_only_the_outermost_task_is_told_of():
     heard: list[memscal.Progress] = []
     with reporting(heard.append):
         inner = (list(Task("inner", 2).counted("ab")) for _ in range(2))
@@ -27,7 +27,7 @@ def test_only_the_outermost_task_is_told_of() -> None:
     assert told(heard) == [("outer", 1, 2), ("outer", 2, 2), ("after", 1, 1)]
 
 
-def test_what_consumes_a_task_hears_of_its_own_work() -> None:
+def test_what_consumes_a_task_hears_of_its_own_work():
     heard: list[memscal.Progress] = []
     with reporting(heard.append):
         for _ in Task("items", 2).counted("ab"):
@@ -35,7 +35,7 @@ def test_what_consumes_a_task_hears_of_its_own_work() -> None:
     assert told(heard) == [("items", 1, 2), ("own", 1, 1), ("items", 2, 2), ("own", 1, 1)]
 
 
-def test_public_functions_tell_their_callback(tmp_path) -> None:
+def test_public_functions_tell_their_callback(tmp_path):
     heard: list[memscal.Progress] = []
     sensor = known_apparatus(conversion_uncertainty=0.005, width_uncertainty=0.01)
     scan = contact_scan(load=(1.0, 2.0), film=sensor.film)
@@ -69,7 +69,7 @@ def test_public_functions_tell_their_callback(tmp_path) -> None:
     assert 2 <= heard[-1].done <= heard[-1].total
 
 
-def test_a_bar_is_shown_in_a_notebook_and_a_line_elsewhere(capsys, monkeypatch) -> None:
+def test_a_bar_is_shown_in_a_notebook_and_a_line_elsewhere(capsys, monkeypatch):
     with reporting(True):
         list(Task("<draws>", 2).counted("ab"))
     assert capsys.readouterr().err.endswith(f"\r{'2 of 2 <draws>':<60}\n")

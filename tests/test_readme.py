@@ -36,11 +36,11 @@ def run_installed(arguments: list[str]) -> list[str]:
     return run.stdout.splitlines()
 
 
-def test_set_up_takes_exactly_two_commands() -> None:
+def test_set_up_takes_exactly_two_commands():
     assert [block.count("\n") for block in COMMANDS[:2]] == [1, 1]
 
 
-def test_the_first_command_calibrates_the_shipped_scan(fresh_folder: Path) -> None:
+def test_the_first_command_calibrates_the_shipped_scan(fresh_folder):
     program, *arguments = shlex.split(COMMANDS[0])[-7:]
     assert Path(program).name == "memscal"
     printed = run_installed(arguments)
@@ -54,7 +54,7 @@ def test_the_first_command_calibrates_the_shipped_scan(fresh_folder: Path) -> No
 
 
 @pytest.mark.usefixtures("fresh_folder")
-def test_the_example_in_python_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_example_in_python_runs(monkeypatch):
     if not FULL:
         few = (0.0, 0.1, 0.2, 0.3, math.inf)
         monkeypatch.setattr("memscal.friction.compare.FRICTIONS", few)

@@ -36,7 +36,7 @@ def drawn(calibration: memscal.Calibration) -> memscal.MonteCarlo:
 
 
 @pytest.mark.parametrize("methods", [("white-noise", "bayesian"), ("bayesian", "white-noise")])
-def test_a_file_holds_both_estimates_and_a_is_that_of_the_method(scan: Path, methods) -> None:
+def test_a_file_holds_both_estimates_and_a_is_that_of_the_method(scan, methods):
     path = scan.with_name("both.h5")
     apparatus = memscal.calibrate(scan, method=methods[0]).apparatus
     apparatus.save(path, overwrite=True)
@@ -65,7 +65,7 @@ def test_a_file_holds_both_estimates_and_a_is_that_of_the_method(scan: Path, met
     assert memscal.measure_stress(contacts, loaded).conversion_constant == a
 
 
-def test_ufloats_have_the_covariance_of_the_parameters(calibration, loaded, scan) -> None:
+def test_ufloats_have_the_covariance_of_the_parameters(calibration, loaded, scan):
     uncertainties = pytest.importorskip("uncertainties")
     (fleet,) = memscal.calibrate_many([scan])
     own = calibration.apparatus.parameters
@@ -80,7 +80,7 @@ def test_ufloats_have_the_covariance_of_the_parameters(calibration, loaded, scan
     assert ratio.nominal_value == pytest.approx(1, abs=0.1)
 
 
-def test_arrays_stand_on_their_axes_in_si_units(calibration, loaded) -> None:
+def test_arrays_stand_on_their_axes_in_si_units(calibration, loaded):
     pytest.importorskip("xarray")
     for result, apparatus in ((calibration, calibration.apparatus), (loaded, loaded)):
         arrays = result.to_xarray()
@@ -103,7 +103,7 @@ def test_arrays_stand_on_their_axes_in_si_units(calibration, loaded) -> None:
     assert swept["seed_conversion_constant"].sizes == {"amplitude": 3, "draw": 2}
 
 
-def test_draws_and_scans_are_rows_of_data_frames(drawn: memscal.MonteCarlo, scan: Path) -> None:
+def test_draws_and_scans_are_rows_of_data_frames(drawn, scan):
     pandas = pytest.importorskip("pandas")
     draws = drawn.to_dataframe()
     np.testing.assert_allclose(draws["gaussian_sigma (m)"], drawn.samples[:, 1])
@@ -122,14 +122,14 @@ def test_draws_and_scans_are_rows_of_data_frames(drawn: memscal.MonteCarlo, scan
         fleet[1].ufloats()
 
 
-def test_draws_have_no_figure_and_no_arrays(drawn: memscal.MonteCarlo) -> None:
+def test_draws_have_no_figure_and_no_arrays(drawn):
     with pytest.raises(memscal.MemscalError, match="no figure of a MonteCarlo"):
         drawn.plot()
     with pytest.raises(memscal.MemscalError, match="no arrays"):
         drawn.to_xarray()
 
 
-def test_a_missing_library_is_named_with_the_extra_that_brings_it(calibration, monkeypatch) -> None:
+def test_a_missing_library_is_named_with_the_extra_that_brings_it(calibration, monkeypatch):
     monkeypatch.setitem(sys.modules, "xarray", None)
     said = r"(?s)xarray is not installed.*memscal\[interop\]"
     with pytest.raises(memscal.MemscalError, match=said):

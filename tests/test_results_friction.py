@@ -39,14 +39,14 @@ def reading(
 
 
 @pytest.mark.parametrize("bound", [0.0999, 0.1001, 0.2451, 0.98765, 1.234, 9.99, 99.6])
-def test_a_bound_is_never_rounded_to_the_side_that_claims_more(bound: float) -> None:
+def test_a_bound_is_never_rounded_to_the_side_that_claims_more(bound):
     lower = float(str(reading(None, bound, None)).split()[1])
     upper = float(str(reading(None, 0.0, bound)).split()[1])
     assert lower <= bound <= upper
     assert upper - lower < 0.11 * bound
 
 
-def test_json_is_standard_and_says_null_and_why_where_there_is_no_value() -> None:
+def test_json_is_standard_and_says_null_and_why_where_there_is_no_value():
     bound = comparison(friction=math.inf, lubrications=("dry",), loadings=("incremental",))
     for load in json.loads(json.dumps(bound.to_dict(), allow_nan=False))["loads"]:
         readings = load["by_loading"]["incremental"]["effective_friction_coefficient"]
@@ -57,7 +57,7 @@ def test_json_is_standard_and_says_null_and_why_where_there_is_no_value() -> Non
     assert "no_value" in {message.kind for message in notes(bound)}
 
 
-def test_rows_hold_every_load_by_every_loading(found: FrictionComparison) -> None:
+def test_rows_hold_every_load_by_every_loading(found):
     rows = found.to_dataframe()
     assert list(rows["load (N)"]) == 4 * list(LOADS)
     profiles = [load.by_profile for loads in found.loads.values() for load in loads]
@@ -65,7 +65,7 @@ def test_rows_hold_every_load_by_every_loading(found: FrictionComparison) -> Non
     np.testing.assert_allclose(rows["friction by profile"], values)
 
 
-def test_coefficients_share_what_scans_share(found: FrictionComparison) -> None:
+def test_coefficients_share_what_scans_share(found):
     joint = {
         f"friction_{lubrication}_{loading}": estimate
         for lubrication, by_loading in found.joint.items()
@@ -83,7 +83,7 @@ def test_coefficients_share_what_scans_share(found: FrictionComparison) -> None:
         assert abs(first.std_dev - other.std_dev) <= (first - other).std_dev <= apart * (1 + 1e-9)
 
 
-def test_points_within_both_extremes_and_their_uncertainty_are_bracketed() -> None:
+def test_points_within_both_extremes_and_their_uncertainty_are_bracketed():
     """Profiles cross: under the flank the frictionless stress is the larger one."""
     calculated = np.array([[10.0, 5.0], [11.0, 5.5], [12.0, 4.0]])
     none = np.zeros_like(calculated)
@@ -94,7 +94,7 @@ def test_points_within_both_extremes_and_their_uncertainty_are_bracketed() -> No
     assert bracketed_share(outside, np.zeros(2), calculated, none + 0.6) == 1
 
 
-def test_lubricated_loads_that_exclude_no_friction_fail_their_check() -> None:
+def test_lubricated_loads_that_exclude_no_friction_fail_their_check():
     def check(rise: float) -> QualityCheck:
         along = np.array([30.0 + rise, 30.0, 60.0])
         joint = {"lubricated": {"total": reading(0.1, 0.05, 0.2, deviance=along)}}
@@ -106,7 +106,7 @@ def test_lubricated_loads_that_exclude_no_friction_fail_their_check() -> None:
     assert failing.p_value == pytest.approx(5.3e-4, rel=0.02)
 
 
-def test_a_misfit_of_all_loads_fails_though_one_loading_is_enough_to_pass() -> None:
+def test_a_misfit_of_all_loads_fails_though_one_loading_is_enough_to_pass():
     bad = reading(0.1, 0.05, 0.2, least=90.0, p_value=1e-8)
     good = reading(0.1, 0.05, 0.2)
     assert not comparison_checks({}, {"dry": {"total": bad}})[0].passed

@@ -29,7 +29,7 @@ def two_threads(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 
 @pytest.mark.usefixtures("two_threads")
-def test_the_limit_holds_until_the_outermost_of_nested_calls_is_over() -> None:
+def test_the_limit_holds_until_the_outermost_of_nested_calls_is_over():
     with single_threaded():
         with single_threaded():
             assert blas_threads() == {1}
@@ -38,28 +38,28 @@ def test_the_limit_holds_until_the_outermost_of_nested_calls_is_over() -> None:
 
 
 @pytest.mark.usefixtures("two_threads")
-def test_a_failed_call_lifts_the_limit_too() -> None:
+def test_a_failed_call_lifts_the_limit_too():
     with pytest.raises(memscal.MemscalError):
         memscal.simulate(points=-1)
     assert blas_threads() == {2}
 
 
 @pytest.mark.usefixtures("two_threads")
-def test_the_user_s_own_number_stays(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_user_s_own_number_stays(monkeypatch):
     monkeypatch.setenv("OMP_NUM_THREADS", "2")
     with single_threaded():
         assert blas_threads() == {2}
 
 
 @pytest.mark.usefixtures("two_threads")
-def test_the_limit_holds_while_a_pool_of_processes_is_open() -> None:
+def test_the_limit_holds_while_a_pool_of_processes_is_open():
     with worker_pool(1), single_threaded():
         assert blas_threads() == {1}
     assert blas_threads() == {2}
 
 
 @pytest.mark.usefixtures("two_threads")
-def test_a_public_function_computes_on_one_thread() -> None:
+def test_a_public_function_computes_on_one_thread():
     during: list[set[int]] = []
 
     class Watching(memscal.GaussianMixture):
@@ -83,7 +83,7 @@ print(os.environ.get("OPENBLAS_NUM_THREADS"), os.environ.get("OMP_NUM_THREADS"))
 
 
 @pytest.mark.parametrize(("user", "printed"), [({}, "1 1"), ({"OMP_NUM_THREADS": "2"}, "None 2")])
-def test_the_command_line_starts_one_thread(user: dict[str, str], printed: str) -> None:
+def test_the_command_line_starts_one_thread(user, printed):
     environment = {k: v for k, v in os.environ.items() if k not in THREAD_VARIABLES} | user
     run = subprocess.run(
         [sys.executable, "-c", PROGRAM], capture_output=True, text=True, check=True, env=environment

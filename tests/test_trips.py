@@ -9,7 +9,7 @@ from pathlib import Path
 TESTS = Path(__file__).parent
 
 
-def test_the_main_jobs_run_few_functions() -> None:
+def test_the_main_jobs_run_few_functions():
     program = [sys.executable, TESTS / "helpers" / "trips.py"]
     run = subprocess.run(program, capture_output=True, text=True, check=True)
     budget = tomllib.loads((TESTS / "house_budget.toml").read_text(encoding="utf-8"))["functions"]

@@ -26,7 +26,7 @@ ROD = 0.25
 
 @pytest.mark.parametrize("friction", [0.0, math.inf])
 @pytest.mark.parametrize("nu", RATIOS)
-def test_calculix_converges_to_the_rods_stiffness_and_base_stress(nu, friction, tmp_path) -> None:
+def test_calculix_converges_to_the_rods_stiffness_and_base_stress(nu, friction, tmp_path):
     bonded = film(nu)
     contact = memscal.indent(bonded, memscal.Rod(radius=ROD * 1e-3), load=1.0, friction=friction)
     stiffness = contact.load / contact.depth * 1e-3

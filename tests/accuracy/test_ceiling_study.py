@@ -32,7 +32,7 @@ def drawn(seed: int) -> tuple[int, dict[str, Any]]:
     return int(rng.integers(3, 8 if places == 20 else 10)), made
 
 
-def test_no_clipped_scan_passes_and_what_is_left_tells_a_within_its_u() -> None:
+def test_no_clipped_scan_passes_and_what_is_left_tells_a_within_its_u():
     silent = []
     unnamed: list[int] = []
     z = []
@@ -58,7 +58,7 @@ def test_no_clipped_scan_passes_and_what_is_left_tells_a_within_its_u() -> None:
     assert np.sqrt(np.mean(np.square(z))) < 1.2
 
 
-def test_good_scans_are_not_clipped() -> None:
+def test_good_scans_are_not_clipped():
     false = []
     for seed in range(GOOD):
         scan = wide_scan(seed, **drawn(seed)[1])

@@ -66,20 +66,20 @@ def direct(law: str, stated: str) -> list[Scan]:
 
 
 @pytest.mark.parametrize("method", ["white-noise", "bayesian"])
-def test_rubber_whose_law_is_not_stated_is_right(method: str) -> None:
+def test_rubber_whose_law_is_not_stated_is_right(method):
     z = deviations(direct("neo-hookean", ""), method=method)
     assert np.all(np.abs(z.mean(axis=0)) < 0.8 + margin(z))
     assert np.all(np.sqrt(np.mean(z**2, axis=0)) < 1.3 * np.sqrt(chi2.isf(CHANCE, SEEDS) / SEEDS))
 
 
 @pytest.mark.parametrize("method", ["white-noise", "bayesian"])
-def test_a_linear_film_whose_law_is_not_stated_is_within_two_uncertainties(method: str) -> None:
+def test_a_linear_film_whose_law_is_not_stated_is_within_two_uncertainties(method):
     z = deviations(direct("linear", ""), method=method)
     assert np.all(np.abs(z.mean(axis=0)) < 2.0 + margin(z))
 
 
 @pytest.mark.parametrize(("friction", "load"), [(math.inf, 1.0), (math.inf, 0.3), (0.0, 0.3)])
-def test_a_rod_at_an_end_of_its_friction_is_within_its_uncertainty(friction, load) -> None:
+def test_a_rod_at_an_end_of_its_friction_is_within_its_uncertainty(friction, load):
     scans = []
     for seed in range(SEEDS):
         made = simulate(seed=seed, load=load, rod_friction=friction)
@@ -93,7 +93,7 @@ KERNELS = {"Gaussian": GAUSSIAN, "tails": TAILS}
 
 @pytest.mark.parametrize("noise", [0.001, 0.005])
 @pytest.mark.parametrize("name", KERNELS)
-def test_the_full_width_by_a_window_is_that_of_g(name: str, noise: float) -> None:
+def test_the_full_width_by_a_window_is_that_of_g(name, noise):
     kernel = KERNELS[name]
     r = np.linspace(0.0, 4e-3, 40001)
     g = kernel.radial(r)
@@ -141,7 +141,7 @@ STATED = ("position_scale_uncertainty", "line_offset_uncertainty", "roundness_un
 
 @pytest.mark.parametrize("method", ["white-noise", "bayesian"])
 @pytest.mark.parametrize("name", PLANS)
-def test_a_plan_predicts_what_calibrations_of_imported_scans_state(name: str, method: str) -> None:
+def test_a_plan_predicts_what_calibrations_of_imported_scans_state(name, method):
     plan = PLANS[name]
     options = {field.name: getattr(plan, field.name) for field in fields(Plan)}
     planned = memscal.design(**options, method=method)

@@ -116,14 +116,14 @@ def margin(values: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize("number", range(DESIGNS))
-def test_predicted_uncertainties_are_those_that_calibrations_state(number: int) -> None:
+def test_predicted_uncertainties_are_those_that_calibrations_state(number):
     found = study(number)
     ratio = found.predicted / np.sqrt(np.mean(found.stated**2, axis=0))
     allowed = TOLERANCE + DEVIATIONS * margin(found.stated)
     assert np.all(np.abs(ratio - 1) < allowed), (ratio, allowed)
 
 
-def test_over_all_designs_the_prediction_is_right_on_average() -> None:
+def test_over_all_designs_the_prediction_is_right_on_average():
     # What one design's seeds leave open, all of them settle.
     ratio = np.array(
         [s.predicted / np.sqrt(np.mean(s.stated**2, axis=0)) for s in map(study, range(DESIGNS))]
@@ -134,7 +134,7 @@ def test_over_all_designs_the_prediction_is_right_on_average() -> None:
 
 
 @pytest.mark.parametrize("number", range(DESIGNS))
-def test_nothing_scatters_more_than_noise_and_prior_together_allow(number: int) -> None:
+def test_nothing_scatters_more_than_noise_and_prior_together_allow(number):
     # Beside its linear answer to noise, an estimate changes its mind about the kind of departure:
     # A and FWHM scatter more than the part called noise, and less than the whole, which allows for
     # departures that a Gaussian has not: over ten designs by 0.57, 1.01 and 0.19 of it.

@@ -85,7 +85,7 @@ def on_plane(calibration: memscal.Calibration, name: str):
 
 
 @pytest.mark.parametrize("kind", STUDIED)
-def test_a_division_by_a_disc_has_no_false_lobes_and_its_a(kind: str) -> None:
+def test_a_division_by_a_disc_has_no_false_lobes_and_its_a(kind):
     deviates = []
     for calibration in calibrated(kind):
         p = calibration.apparatus.parameters
@@ -96,7 +96,7 @@ def test_a_division_by_a_disc_has_no_false_lobes_and_its_a(kind: str) -> None:
 
 
 @pytest.mark.parametrize("kind", STEADY)
-def test_the_scatter_from_scan_to_scan_is_as_stated(kind: str) -> None:
+def test_the_scatter_from_scan_to_scan_is_as_stated(kind):
     calibrations = calibrated(kind)
     found = np.std([on_plane(each, "g") for each in calibrations], axis=0, ddof=1)
     stated = np.mean([on_plane(each, "g_scatter") ** 2 for each in calibrations], axis=0)
@@ -104,14 +104,14 @@ def test_the_scatter_from_scan_to_scan_is_as_stated(kind: str) -> None:
 
 
 @pytest.mark.parametrize("kind", STEADY)
-def test_what_the_form_of_g_leaves_over_the_plane_fails_a_check(kind: str) -> None:
+def test_what_the_form_of_g_leaves_over_the_plane_fails_a_check(kind):
     for calibration in calibrated(kind):
         checks = {check.name: check.passed for check in calibration.apparatus.checks}
         assert checks["field_residuals"] == (kind == "alike")
         assert checks["field_lobes"]
 
 
-def test_a_wrong_disc_stops_the_division_where_its_misfit_is(monkeypatch) -> None:
+def test_a_wrong_disc_stops_the_division_where_its_misfit_is(monkeypatch):
     monkeypatch.setitem(KINDS, "wrong", (ALIKE, SIDE, 0.0, 1.04))
     disc = memscal.IdealReference("disc", RADIUS)
     wrong = memscal.calibrate(raster("wrong", 0), reference=disc, other=False)

@@ -100,7 +100,7 @@ def study(case: Case) -> tuple[Outcome, dict[str, np.ndarray]]:
 
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
-def test_g_and_a_are_found_and_are_as_uncertain_as_stated(case: Case) -> None:
+def test_g_and_a_are_found_and_are_as_uncertain_as_stated(case):
     outcome = study(case)[0]
     assert outcome.exceeded(LIMITS[case.kind]) == []
     limit = root_mean_square_limit(A_LIMITS[case.noise], seeds_of(case), CHANCE)
@@ -108,7 +108,7 @@ def test_g_and_a_are_found_and_are_as_uncertain_as_stated(case: Case) -> None:
 
 
 @pytest.mark.parametrize("case", GAUSSIANS, ids=lambda case: case.name)
-def test_the_fit_reaches_its_bound_and_states_what_it_scatters_by(case: Case) -> None:
+def test_the_fit_reaches_its_bound_and_states_what_it_scatters_by(case):
     columns = study(case)[1]
     seeds = seeds_of(case)
     error = columns["fit"]
@@ -129,13 +129,13 @@ def test_the_fit_reaches_its_bound_and_states_what_it_scatters_by(case: Case) ->
     assert (nuisances < high * 1.15).all()
 
 
-def test_the_bands_of_95_percent_hold_g_pooled_over_all_cases() -> None:
+def test_the_bands_of_95_percent_hold_g_pooled_over_all_cases():
     share, error = np.array([study(case)[0].coverage("G") for case in CASES]).T
     chance = 4 * np.linalg.norm(error) / len(CASES)
     assert 0.90 - chance < share.mean() < 0.99 + chance
 
 
-def test_two_routes_to_one_scan_agree_but_for_one_good_scan_in_a_thousand() -> None:
+def test_two_routes_to_one_scan_agree_but_for_one_good_scan_in_a_thousand():
     differences = np.concatenate([study(case)[1]["agreement"] for case in CASES])
     limit = agreement(memscal.calibrate(simulated()).apparatus).limit
     failed = int(np.sum(differences > limit))
@@ -143,7 +143,7 @@ def test_two_routes_to_one_scan_agree_but_for_one_good_scan_in_a_thousand() -> N
     assert binom.sf(failed - 1, differences.size, 1e-3) > 1e-3
 
 
-def test_a_ring_that_only_the_division_follows_is_told() -> None:
+def test_a_ring_that_only_the_division_follows_is_told():
     scans = [GAUSSIANS[0].scan(seed) for seed in range(6)]
     ringed = [added_ring(scan, 0.01, 4e-3, 0.7e-3) for scan in scans]
     # A curved baseline, which both fit, would take a part of it.
@@ -152,7 +152,7 @@ def test_a_ring_that_only_the_division_follows_is_told() -> None:
     assert np.median([check.value for check in values]) > values[0].limit
 
 
-def test_a_raster_scatters_by_no_more_than_is_stated() -> None:
+def test_a_raster_scatters_by_no_more_than_is_stated():
     deviates = []
     seeds = range(50 if FULL else 2)  # a raster costs as much as twenty lines
     for seed in seeds:
@@ -177,7 +177,7 @@ def of_repeats(noise: float, seed: int, shift: float, **options) -> memscal.Appa
     return memscal.calibrate(scan, **options).apparatus
 
 
-def test_repeats_that_share_their_centre_are_told_apart_as_rarely_as_is_said() -> None:
+def test_repeats_that_share_their_centre_are_told_apart_as_rarely_as_is_said():
     found = [of_repeats(0.005, seed, 0.0).process.configuration["centre"] for seed in range(PASSES)]
     own = sum(choice["choice"] == "per-repeat" for choice in found)
     assert own <= binom.ppf(1 - CHANCE, PASSES, 1e-3)
@@ -185,7 +185,7 @@ def test_repeats_that_share_their_centre_are_told_apart_as_rarely_as_is_said() -
     assert low <= sum(choice["p_value"] < 0.4 for choice in found) <= high
 
 
-def test_repeats_that_moved_have_centres_of_their_own_within_their_uncertainties() -> None:
+def test_repeats_that_moved_have_centres_of_their_own_within_their_uncertainties():
     shift = 40e-6
     names = ("conversion_constant_gaussian", "gaussian_sigma", "centre", "centre_3")
     truths = np.array([CONVERSION, WIDTHS[0.005], CENTRE - shift, CENTRE + shift])

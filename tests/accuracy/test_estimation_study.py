@@ -53,14 +53,14 @@ def script() -> dict[str, object]:
     return runpy.run_path(str(DOCS / "estimation_table.py"))
 
 
-def test_the_table_has_the_cases_of_the_study() -> None:
+def test_the_table_has_the_cases_of_the_study():
     setting = script()["setting"]
     assert [row[:5] for row in stated()] == [setting(case) for case in CASES.values()]
 
 
 @pytest.mark.full_study
 @pytest.mark.parametrize("name", REDUCED)
-def test_the_table_is_what_its_script_prints(name: str) -> None:
+def test_the_table_is_what_its_script_prints(name):
     printed = script()["row"](study(name))
     for ours, theirs in zip(printed[5:-1], stated()[list(CASES).index(name)][5:-1], strict=True):
         # Another processor may round differently, and a seed cross a limit by it.
@@ -72,11 +72,11 @@ def test_the_table_is_what_its_script_prints(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_errors_and_bands_of_a_case_keep_their_limits(name: str) -> None:
+def test_errors_and_bands_of_a_case_keep_their_limits(name):
     assert study(name).exceeded(CASES[name].limits) == []
 
 
-def test_a_band_or_an_uncertainty_that_is_far_off_is_told() -> None:
+def test_a_band_or_an_uncertainty_that_is_far_off_is_told():
     outcome = study(REDUCED[0])
     limits = outcome.case.limits
 
@@ -92,27 +92,27 @@ def test_a_band_or_an_uncertainty_that_is_far_off_is_told() -> None:
 
 @pytest.mark.full_study
 @pytest.mark.parametrize("of", EXCEPTIONS)
-def test_an_exception_is_made_only_where_a_goal_does_not_hold(of: str) -> None:
+def test_an_exception_is_made_only_where_a_goal_does_not_hold(of):
     cases = [case for case in CASES.values() if of in (case.kind, case.name)]
     assert any(study(case.name).exceeded(case.goal) for case in cases)
 
 
 @pytest.mark.parametrize("band", MEAN_COVERAGE)
-def test_bands_of_95_percent_hold_the_truth_as_often_as_is_said(band: str) -> None:
+def test_bands_of_95_percent_hold_the_truth_as_often_as_is_said(band):
     share, error = mean_coverage([study(name) for name in NAMES], band)
     low, high = MEAN_COVERAGE[band]
     assert low - norm.isf(chance(SEEDS)) * error < share < high + norm.isf(chance(SEEDS)) * error
 
 
-def test_departures_that_are_allowed_for_cost_a_gaussian_little_of_a() -> None:
+def test_departures_that_are_allowed_for_cost_a_gaussian_little_of_a():
     ratio, count = mean_efficiency([study(name) for name in NAMES])
     assert ratio < root_mean_square_limit(EFFICIENCY, count, chance(SEEDS))
 
 
 @pytest.mark.parametrize("kernel", [DISC, TAILS, RING])
 def test_scans_of_the_study_are_those_of_the_simulation_far_below_their_noise(
-    kernel: memscal.RadialKernel,
-) -> None:
+    kernel,
+):
     # Finite elements and a direct sum on one side, transforms on the other.
     setting = {"kernel": kernel, "noise": 1e-3, "repeats": 2, "points": 33, "seed": 5}
     ours = direct_scan(**setting)

@@ -95,7 +95,7 @@ def named(result: memscal.Calibration) -> list[str]:
 
 
 @pytest.mark.parametrize("cause", CAUSES)
-def test_the_true_cause_is_among_those_named(cause: str) -> None:
+def test_the_true_cause_is_among_those_named(cause):
     found = failing(CAUSES[cause])
     hits = [cause in named(result) for result in found]
     assert hits or cause in PASSING
@@ -111,7 +111,7 @@ def test_the_true_cause_is_among_those_named(cause: str) -> None:
 
 
 @pytest.mark.parametrize("sensor", SENSORS)
-def test_a_g_that_is_not_gaussian_is_named_first(sensor: str) -> None:
+def test_a_g_that_is_not_gaussian_is_named_first(sensor):
     found = failing([SENSORS[sensor]])
     hits = ["The scan is explained by a G that is not" in result.answer() for result in found]
     assert found
@@ -119,7 +119,7 @@ def test_a_g_that_is_not_gaussian_is_named_first(sensor: str) -> None:
 
 
 @pytest.mark.parametrize("cause", UNLISTED)
-def test_a_cause_that_is_not_listed_is_left_open(cause: str) -> None:
+def test_a_cause_that_is_not_listed_is_left_open(cause):
     for result in failing([UNLISTED[cause]]):
         text = result.answer()
         assert "or by a cause that is not listed" in text

@@ -113,7 +113,7 @@ SLIDING = (0.0, (0.1,), (0.15, 0.3, 0.00625 / REFINEMENT))
 
 
 @pytest.mark.parametrize(("friction", "loads", "fold"), [STICKING, SLIDING] if FULL else [STICKING])
-def test_the_film_under_a_rod_agrees_with_felupe(friction, loads, fold) -> None:
+def test_the_film_under_a_rod_agrees_with_felupe(friction, loads, fold):
     targets = tuple(Load(load) for load in loads)
     sticking = friction > 0
     ours = solve_finite_strain(FILM, ROD, targets, sticking=sticking, refinement=REFINEMENT)

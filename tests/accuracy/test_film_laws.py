@@ -50,7 +50,7 @@ def scans_of(
 
 @pytest.mark.parametrize("truth", [LINEAR, RUBBER, MOONEY])
 @pytest.mark.parametrize("sensor", [*SENSORS])
-def test_loads_prefer_the_law_of_the_film(sensor: str, truth: str) -> None:
+def test_loads_prefer_the_law_of_the_film(sensor, truth):
     # Mooney-Rivlin is weighed where it is stated, and hardly told from neo-Hookean.
     stated = {"law": truth, "mooney_rivlin_ratio": RATIO} if truth == MOONEY else {}
     other = RUBBER if truth == LINEAR else LINEAR
@@ -74,7 +74,7 @@ def test_loads_prefer_the_law_of_the_film(sensor: str, truth: str) -> None:
         (LINEAR, {"loads": (1.0,), "radii": (0.15e-3, 0.35e-3)}),
     ],
 )
-def test_an_estimated_thickness_is_off_by_what_it_states(law: str, setting, sensor: str) -> None:
+def test_an_estimated_thickness_is_off_by_what_it_states(law, setting, sensor):
     # What is stated is drawn about the truth: of both, the difference is all that counts.
     u = 0.1e-3
     truth = PAPER_FILM.thickness

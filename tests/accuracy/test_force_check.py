@@ -42,13 +42,13 @@ def alarmed(**mistake: Any) -> int:
     return sum(alarms > 0 for _, _, alarms, _ in study(**mistake))
 
 
-def test_clean_experiments_seldom_alarm() -> None:
+def test_clean_experiments_seldom_alarm():
     # One check at 95 % and six at 99.7 %.
     assert alarmed() <= binom.ppf(1 - CHANCE, EXPERIMENTS, 0.065)
 
 
 @pytest.mark.parametrize("gain", [1 / 1.05, 1.05] if FULL else [1.05])
-def test_a_gain_that_is_wrong_by_five_percent_is_seen(gain: float) -> None:
+def test_a_gain_that_is_wrong_by_five_percent_is_seen(gain):
     assert alarmed(gain=gain) >= binom.ppf(CHANCE, EXPERIMENTS, 0.9)
 
 

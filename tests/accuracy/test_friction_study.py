@@ -102,7 +102,7 @@ def at_least(count: int, of: int, share: float) -> bool:
 
 
 @pytest.mark.parametrize("beside", [True, False])
-def test_the_interval_of_all_loads_holds_the_truth_and_misses_on_both_sides(beside: bool) -> None:
+def test_the_interval_of_all_loads_holds_the_truth_and_misses_on_both_sides(beside):
     # Lubricated loads beside the dry ones, or apart.
     found = [(one.truth, one.joint if beside else one.apart) for one in outcomes(*FRICTIONS)]
     assert all(bool(joint.beside) == beside for _, joint in found)
@@ -117,7 +117,7 @@ def test_the_interval_of_all_loads_holds_the_truth_and_misses_on_both_sides(besi
 
 
 @pytest.mark.parametrize("friction", [mu for mu in FRICTIONS if mu > 0])
-def test_the_coefficient_is_right_on_average(friction: float) -> None:
+def test_the_coefficient_is_right_on_average(friction):
     pairs = [(one.joint.best, one.joint.standard_uncertainty) for one in outcomes(friction)]
     error = np.array([(best - friction) / u for best, u in pairs if u])
     assert abs(error.mean()) < 0.15 + t.isf(CHANCE / 2, error.size - 1) * error.std(
@@ -126,7 +126,7 @@ def test_the_coefficient_is_right_on_average(friction: float) -> None:
 
 
 @pytest.mark.parametrize("friction", FRICTIONS)
-def test_no_coefficient_is_left_out(friction: float) -> None:
+def test_no_coefficient_is_left_out(friction):
     intervals = [one.joint.interval for one in outcomes(friction)]
     held = [interval.holds(friction) for interval in intervals]
     assert at_least(sum(held), len(held), 0.90)
@@ -137,7 +137,7 @@ def test_no_coefficient_is_left_out(friction: float) -> None:
     assert at_least(sum(told), len(told), 0.90)
 
 
-def test_the_intervals_of_single_loads_hold_the_truth() -> None:
+def test_the_intervals_of_single_loads_hold_the_truth():
     # Loads of one experiment share their systematic errors: the experiment is the unit.
     held = np.array(
         [
@@ -151,7 +151,7 @@ def test_the_intervals_of_single_loads_hold_the_truth() -> None:
     assert np.mean(confused) < 0.15
 
 
-def test_full_stick_is_a_lower_bound_and_no_number() -> None:
+def test_full_stick_is_a_lower_bound_and_no_number():
     found = outcomes(1.0)
     bounds = [one.joint for one in found if one.joint.value is None]
     assert at_least(len(bounds), len(found), 0.94)
@@ -161,7 +161,7 @@ def test_full_stick_is_a_lower_bound_and_no_number() -> None:
     assert np.median([bound.interval.low for bound in bounds]) > 0.15
 
 
-def test_lubricated_contacts_reach_no_friction() -> None:
+def test_lubricated_contacts_reach_no_friction():
     found = outcomes(*FRICTIONS)
     intervals = [one.comparison.joint["lubricated"]["incremental"].interval for one in found]
     reached = [interval.low == 0 for interval in intervals]
@@ -169,11 +169,11 @@ def test_lubricated_contacts_reach_no_friction() -> None:
     assert np.median([interval.upper for interval in intervals]) < 0.08
 
 
-def test_chi_square_is_as_large_as_its_degrees_say() -> None:
+def test_chi_square_is_as_large_as_its_degrees_say():
     assert kstest([one.joint.p_value for one in outcomes(*FRICTIONS)], "uniform").pvalue > CHANCE
 
 
-def test_dry_and_lubricated_differ_where_there_is_friction_only() -> None:
+def test_dry_and_lubricated_differ_where_there_is_friction_only():
     def apart(friction: float) -> list[bool]:
         pairs = [one.comparison.dry_against_lubricated for one in outcomes(friction)]
         return [pair.p_value < 0.05 for both in pairs for pair in both]
@@ -183,7 +183,7 @@ def test_dry_and_lubricated_differ_where_there_is_friction_only() -> None:
     assert np.mean(apart(0.3)) > 0.9
 
 
-def test_checks_of_friction_pass_where_nothing_is_wrong() -> None:
+def test_checks_of_friction_pass_where_nothing_is_wrong():
     found = outcomes(*FRICTIONS)
     # What moves the dry coefficient by its uncertainty is found, and one of ten times by chance.
     for names, share in (
@@ -195,7 +195,7 @@ def test_checks_of_friction_pass_where_nothing_is_wrong() -> None:
 
 
 @pytest.mark.full_study
-def test_a_mistake_that_sensor_and_film_share_cancels_beside_lubricated_loads() -> None:
+def test_a_mistake_that_sensor_and_film_share_cancels_beside_lubricated_loads():
     seeds = range(min(SEEDS, 16))
 
     def shifts(**mistakes: float) -> tuple[float, float]:

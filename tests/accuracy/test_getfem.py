@@ -118,7 +118,7 @@ def worst(friction: float, states: list[dict[str, Any]]) -> dict[str, float]:
     return {name: max(one[name] for one in each) for name in each[0]}
 
 
-def test_getfem_agrees_on_the_sphere_without_friction(python: str) -> None:
+def test_getfem_agrees_on_the_sphere_without_friction(python):
     # Without friction the path is of no account, and a step per load is enough.
     found = worst(0.0, by_getfem(python, 0.0, len(LOADS), 0.025 if FULL else 0.05))
     limits = {"depth": 1e-4, "contact radius": 1e-3, "highest base stress": 3e-4}
@@ -127,7 +127,7 @@ def test_getfem_agrees_on_the_sphere_without_friction(python: str) -> None:
 
 
 @pytest.mark.parametrize("friction", FRICTIONS)
-def test_getfem_agrees_on_the_sphere_with_friction(python: str, friction: float) -> None:
+def test_getfem_agrees_on_the_sphere_with_friction(python, friction):
     coarse, fine = (by_getfem(python, friction, steps) for steps in STEPS[-2:])
     found = worst(friction, in_the_limit(coarse, fine))
     limit = 5e-4 if FULL else 2e-3
@@ -139,6 +139,6 @@ def test_getfem_agrees_on_the_sphere_with_friction(python: str, friction: float)
 
 
 @pytest.mark.parametrize("friction", FRICTIONS)
-def test_smaller_steps_bring_getfem_closer(python: str, friction: float) -> None:
+def test_smaller_steps_bring_getfem_closer(python, friction):
     errors = [worst(friction, by_getfem(python, friction, n))["base stress"] for n in STEPS]
     assert all(fine < coarse / 1.3 for coarse, fine in itertools.pairwise(errors))

@@ -79,7 +79,7 @@ def require_unit(
 
 @pytest.mark.parametrize("route", ROUTES)
 @pytest.mark.parametrize("pair", SPLITS, ids=lambda pair: f"{pair[0].name}, {pair[1]}")
-def test_halves_of_a_scan_differ_as_predicted(pair: tuple[Case, str], route: str) -> None:
+def test_halves_of_a_scan_differ_as_predicted(pair, route):
     # Probabilities that follow the data bend the posterior mean, whose squared slope exceeds the
     # variance on average (Poincare's inequality): where a departure is in doubt, up to threefold.
     # Where the halves prefer a ring and a disc, they differ by more than noise to first order.
@@ -87,5 +87,5 @@ def test_halves_of_a_scan_differ_as_predicted(pair: tuple[Case, str], route: str
 
 
 @pytest.mark.parametrize("route", ROUTES)
-def test_halves_of_all_cases_together_differ_as_predicted(route: str) -> None:
+def test_halves_of_all_cases_together_differ_as_predicted(route):
     require_unit(np.concatenate([deviates(*pair) for pair in SPLITS]), route)

@@ -97,18 +97,18 @@ def enough(share: float) -> int:
 
 
 @pytest.mark.parametrize("kind", ["precise", "known"])
-def test_a_slip_length_is_preferred_where_it_is_the_truth(kind: str) -> None:
+def test_a_slip_length_is_preferred_where_it_is_the_truth(kind):
     found = experiments(MACROSCOPIC, SLIP_LENGTH, kind)
     assert sum(one.yielding_preferred for one in found) >= enough(0.98)
 
 
-def test_an_effective_coefficient_is_not_given_up_where_it_is_the_truth() -> None:
+def test_an_effective_coefficient_is_not_given_up_where_it_is_the_truth():
     for friction in (0.1, 0.2):
         found = experiments(friction, kind="precise")
         assert sum(not one.yielding_preferred for one in found) >= enough(0.98)
 
 
-def test_on_a_known_film_the_slip_length_is_recovered_within_a_fifth() -> None:
+def test_on_a_known_film_the_slip_length_is_recovered_within_a_fifth():
     found = experiments(MACROSCOPIC, SLIP_LENGTH, "known")
     ratios = np.array([one.length.best for one in found]) / SLIP_LENGTH
     assert np.sum(np.abs(ratios - 1) <= 0.20) >= enough(0.95)
@@ -117,7 +117,7 @@ def test_on_a_known_film_the_slip_length_is_recovered_within_a_fifth() -> None:
     assert np.mean(ratios) == pytest.approx(1.0, abs=0.03 + 3.3 * 0.08 / math.sqrt(SEEDS))
 
 
-def test_on_a_film_known_as_the_papers_it_is_recovered_most_often() -> None:
+def test_on_a_film_known_as_the_papers_it_is_recovered_most_often():
     # Stated: 10 %.  The spread over experiments is 13.5 %, as the contacts are linearised about the
     # stated film: docs/interface.md.
     found = experiments(MACROSCOPIC, SLIP_LENGTH)
@@ -127,7 +127,7 @@ def test_on_a_film_known_as_the_papers_it_is_recovered_most_often() -> None:
     assert np.median(ratios) == pytest.approx(1.0, abs=0.12 + 0.2 / math.sqrt(SEEDS))
 
 
-def test_an_experiment_like_the_papers_tells_a_slip_length_at_best_by_a_factor() -> None:
+def test_an_experiment_like_the_papers_tells_a_slip_length_at_best_by_a_factor():
     wide = 0
     for one in experiments(MACROSCOPIC, 1.82e-6, "paper"):
         interval = one.length.interval

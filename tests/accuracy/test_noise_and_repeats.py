@@ -32,7 +32,7 @@ def clean(side: int) -> FloatArray:
     return np.stack([ROUND.voltages(x, y=float(y)) for y in x])
 
 
-def test_a_good_raster_of_unknown_noise_fails_a_check_as_rarely_as_is_meant() -> None:
+def test_a_good_raster_of_unknown_noise_fails_a_check_as_rarely_as_is_meant():
     failed = 0
     sides = (23, 25, 29)
     for side in sides:
@@ -48,8 +48,8 @@ def test_a_good_raster_of_unknown_noise_fails_a_check_as_rarely_as_is_meant() ->
 
 @pytest.mark.parametrize("share", [0.05, 0.1, 0.15])
 def test_outliers_move_a_division_by_its_uncertainty_from_the_truth_and_the_other_route(
-    share: float,
-) -> None:
+    share,
+):
     off = []
     for seed in range(OUTLIERS):
         made = scan(ROUND, seed)
@@ -67,7 +67,7 @@ def test_outliers_move_a_division_by_its_uncertainty_from_the_truth_and_the_othe
 
 
 @pytest.mark.parametrize("anew", [False, True])
-def test_errors_of_positions_are_as_stated(anew: bool) -> None:
+def test_errors_of_positions_are_as_stated(anew):
     fine = np.arange(-HALF - 0.2e-3, HALF + 0.2e-3, 0.02e-3)
     at = make_interp_spline(fine, ROUND.voltages(fine), k=5)
     film: Any = {"thickness_uncertainty": None, "poisson_ratio_uncertainty": None}
@@ -93,7 +93,7 @@ def test_errors_of_positions_are_as_stated(anew: bool) -> None:
     assert np.mean(np.abs(off) < 2) >= binom.ppf(RARE, 2 * REPEATS, 0.95) / (2 * REPEATS)
 
 
-def test_gains_that_vary_between_repeats_are_estimated_and_counted() -> None:
+def test_gains_that_vary_between_repeats_are_estimated_and_counted():
     u = ROUND.voltages(line())
     names = ("conversion_constant", "conversion_constant_gaussian")
     off = []

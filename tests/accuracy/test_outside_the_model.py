@@ -68,7 +68,7 @@ def unstated(world: World, noise: float) -> memscal.Scan:
         pytest.param("bayesian", 0.005, marks=pytest.mark.full_study),
     ],
 )
-def test_sizes_for_one_uncertainty_are_those_of_perturbed_scans(method: str, noise: float) -> None:
+def test_sizes_for_one_uncertainty_are_those_of_perturbed_scans(method, noise):
     exact = calibrated(unstated(ROUND, noise), method=method).apparatus
     sizes = {assumption.name: assumption.sizes for assumption in exact.assumptions}
     assert set(PERTURBED) <= set(sizes)
@@ -108,7 +108,7 @@ BY_NIGHT = {
 
 
 @pytest.mark.parametrize("name", [pytest.param(n, marks=BY_NIGHT.get(n, ())) for n in ROWS])
-def test_what_a_scan_does_not_state_is_counted_alarmed_or_named_as_the_page_says(name: str) -> None:
+def test_what_a_scan_does_not_state_is_counted_alarmed_or_named_as_the_page_says(name):
     stated = TABLE[name]
     told = set(stated["told by"].split(", "))
     assert (told == {"nothing"}) == (name in UNTOLD)
@@ -124,7 +124,7 @@ def test_what_a_scan_does_not_state_is_counted_alarmed_or_named_as_the_page_says
 
 
 @pytest.mark.parametrize("name", UNTOLD)
-def test_no_check_could_tell_what_nothing_tells(name: str) -> None:
+def test_no_check_could_tell_what_nothing_tells(name):
     # By the most powerful test of one false alarm in a thousand (Neyman and Pearson) of a shape
     # that is known, beside A, sigma, centre, offset, drift and what is counted.
     x = line()
@@ -148,7 +148,7 @@ def test_no_check_could_tell_what_nothing_tells(name: str) -> None:
     assert f"{100 * power:.0f} %" in (DOCS / "checks.md").read_text(encoding="utf-8")
 
 
-def test_a_tail_shows_at_little_noise_beside_a_baseline_stated_as_straight() -> None:
+def test_a_tail_shows_at_little_noise_beside_a_baseline_stated_as_straight():
     row = ROWS["tail of G of 3 mm"]
     world = row.world(row.sizes_at([3.0])[0])
     failed = 0
@@ -158,7 +158,7 @@ def test_a_tail_shows_at_little_noise_beside_a_baseline_stated_as_straight() -> 
     assert failed >= binom.ppf(CHANCE, RUNS, ALARMED)
 
 
-def test_a_lag_shows_where_the_line_is_scanned_back() -> None:
+def test_a_lag_shows_where_the_line_is_scanned_back():
     row = ROWS["lag along the line"]
     lag = row.sizes_at([3.0])[0]
     scan = perturbed_scan(row.world(lag), 0)

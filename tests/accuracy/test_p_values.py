@@ -55,12 +55,12 @@ def p_values(sensor: str, noise: float) -> dict[str, np.ndarray]:
 @pytest.mark.parametrize("noise", NOISES)
 @pytest.mark.parametrize("sensor", SENSORS)
 @pytest.mark.parametrize("name", ["size", "neighbours"])
-def test_p_values_are_uniform(name: str, sensor: str, noise: float) -> None:
+def test_p_values_are_uniform(name, sensor, noise):
     assert kstest(p_values(sensor, noise)[name], "uniform").pvalue > CHANCE
 
 
 @pytest.mark.parametrize("name", ["size", "neighbours", "steps"])
-def test_p_values_of_all_sensors_together_are_uniform_in_their_lower_tail(name: str) -> None:
+def test_p_values_of_all_sensors_together_are_uniform_in_their_lower_tail(name):
     # Seeds differ between sensors; the two noises share theirs, and are looked at one by one.
     for noise in NOISES:
         found = np.concatenate([p_values(sensor, noise)[name] for sensor in SENSORS])
@@ -70,7 +70,7 @@ def test_p_values_of_all_sensors_together_are_uniform_in_their_lower_tail(name: 
             assert (low if name != "steps" else 0) <= np.sum(found < level) <= high
 
 
-def test_uncertain_positions_are_noise_of_every_chi_square() -> None:
+def test_uncertain_positions_are_noise_of_every_chi_square():
     fine = simulated(noise=0.0, points=1025)
     error = 10e-6
     voltage = make_interp_spline(fine.x, fine.u_zz, k=5)
@@ -89,7 +89,7 @@ def test_uncertain_positions_are_noise_of_every_chi_square() -> None:
     assert np.sum(np.array(found["reconvolution"]) > 1) <= binom.ppf(1 - CHANCE, SEEDS, 1e-3)
 
 
-def test_clean_scans_hardly_ever_fail_a_check() -> None:
+def test_clean_scans_hardly_ever_fail_a_check():
     settings = [
         {},
         {"noise": 0.02},

@@ -60,7 +60,7 @@ def rms(values: FloatArray) -> float:
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_halves_of_a_raster_differ_as_their_uncertainty_says(method: str) -> None:
+def test_halves_of_a_raster_differ_as_their_uncertainty_says(method):
     of_noise = []
     of_all = []
     of_truth = []
@@ -98,7 +98,7 @@ def test_halves_of_a_raster_differ_as_their_uncertainty_says(method: str) -> Non
     assert abs(np.mean(deviates)) < 3.3 / np.sqrt(len(deviates))
 
 
-def test_held_out_points_are_predicted_as_well_as_by_a_tuned_wiener_filter() -> None:
+def test_held_out_points_are_predicted_as_well_as_by_a_tuned_wiener_filter():
     ratios: dict[str, list[float]] = {method: [] for method in METHODS}
     for seed in range(SEEDS):
         scan = tailed_raster(seed=seed, **SIZE)

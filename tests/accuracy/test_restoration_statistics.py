@@ -117,7 +117,7 @@ def everything() -> np.ndarray:
     return np.concatenate([study(case, noise) for case in CASES for noise in NOISES])
 
 
-def test_the_band_holds_the_truth_as_often_as_it_says() -> None:
+def test_the_band_holds_the_truth_as_often_as_it_says():
     within = everything()[:, 0]
     allowed = SIGMAS * within.std() / np.sqrt(within.size)
     assert 0.93 - allowed < within.mean() < 0.98 + allowed
@@ -125,8 +125,8 @@ def test_the_band_holds_the_truth_as_often_as_it_says() -> None:
 
 @pytest.mark.full_study
 def test_departures_are_as_strong_as_was_chosen_on_other_contacts(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    monkeypatch,
+):
     # The rule: the strongest of 1, 0.5, 0.4, 0.3, 0.2 and 0.1 that holds at most 98 %.  0.5 does so
     # within chance: docs/restoration.md.
     cases = [(press(), kernel, n) for press, kernel in CHOSEN_ON.values() for n in NOISES]
@@ -141,7 +141,7 @@ def test_departures_are_as_strong_as_was_chosen_on_other_contacts(
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_no_contact_is_left_out_of_the_band_or_has_another_error_than_stated(case: str) -> None:
+def test_no_contact_is_left_out_of_the_band_or_has_another_error_than_stated(case):
     found = np.concatenate([study(case, noise) for noise in NOISES])
     within = found[:, 0]
     assert within.mean() > 0.90 - SIGMAS * within.std() / np.sqrt(within.size)
@@ -149,20 +149,20 @@ def test_no_contact_is_left_out_of_the_band_or_has_another_error_than_stated(cas
     assert 0.3 < np.sqrt(error / stated) < 1.5
 
 
-def test_over_all_contacts_the_error_is_two_thirds_of_what_is_stated_or_more() -> None:
+def test_over_all_contacts_the_error_is_two_thirds_of_what_is_stated_or_more():
     ratios = everything()[:, 1] / everything()[:, 2]
     spread = np.std(ratios**2) / np.sqrt(ratios.size)
     assert np.mean(ratios**2) > (2 / 3) ** 2 - SIGMAS * spread
 
 
-def test_the_error_falls_with_the_noise() -> None:
+def test_the_error_falls_with_the_noise():
     for case in CASES:
         errors = [np.median(study(case, noise)[:, 1]) for noise in NOISES]
         assert errors == sorted(errors)
         assert errors[0] < 0.01
 
 
-def test_the_force_is_the_load_as_often_as_it_says() -> None:
+def test_the_force_is_the_load_as_often_as_it_says():
     z = everything()[:, 3]
     assert np.sum(np.abs(z) <= 1.96) >= binom.ppf(CHANCE, z.size, 0.92)
     # Shapes that no contact has are allowed for: errors are three quarters of what is stated.
@@ -170,7 +170,7 @@ def test_the_force_is_the_load_as_often_as_it_says() -> None:
 
 
 @pytest.mark.parametrize("kernel", [GAUSSIAN, RING], ids=["gaussian", "ring"])
-def test_the_uncertainty_of_a_calibrated_sensor_is_counted(kernel: memscal.GaussianMixture) -> None:
+def test_the_uncertainty_of_a_calibrated_sensor_is_counted(kernel):
     outcomes = []
     for seed in range(2 * SEEDS):
         rod = made.simulated(kernel=kernel, noise=0.01, seed=500 + seed, load_uncertainty=None)

@@ -20,7 +20,7 @@ NOISES = (0.001, 0.005, 0.02)
 
 
 @pytest.mark.parametrize("method", ["white-noise", "bayesian", "tikhonov", "wiener"])
-def test_the_shape_of_a_sound_g_passes(method: str) -> None:
+def test_the_shape_of_a_sound_g_passes(method):
     kernels = [RING, TAILS, memscal.SmoothedDisc(radius=0.6e-3, sigma=0.25e-3)]
     failures = 0
     for seed in range(SEEDS):
@@ -30,7 +30,7 @@ def test_the_shape_of_a_sound_g_passes(method: str) -> None:
     assert failures <= binom.isf(CHANCE, SEEDS, FALSE_ALARM)
 
 
-def test_what_no_window_divides_scatters_by_half_to_twice_what_is_stated() -> None:
+def test_what_no_window_divides_scatters_by_half_to_twice_what_is_stated():
     count = 20 if FULL else 5
     radii = np.linspace(0, 2e-3, 9)
     values = []

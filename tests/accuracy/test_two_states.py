@@ -22,7 +22,7 @@ def root_mean_square(outcomes: list[Outcome]) -> float:
     return float(np.sqrt(np.mean([one.deviation**2 for one in outcomes])))
 
 
-def test_what_the_two_states_do_not_share_is_counted() -> None:
+def test_what_the_two_states_do_not_share_is_counted():
     cases = (
         (0.0, 1.0, 1.0),
         (0.02, 1.0, 1.0),
@@ -37,7 +37,7 @@ def test_what_the_two_states_do_not_share_is_counted() -> None:
     assert root_mean_square(found) < root_mean_square_limit(1.4, SEEDS, CHANCE)
 
 
-def test_the_uncertainty_of_equal_states_stays_small() -> None:
+def test_the_uncertainty_of_equal_states_stays_small():
     uncertainties = [perturbed(0.0, seed).dry.standard_uncertainty for seed in range(SEEDS)]
     assert np.mean(uncertainties) <= 0.013
 
@@ -61,7 +61,7 @@ COMMON = {
 
 
 @pytest.mark.parametrize("name", COMMON)
-def test_what_both_states_share_cancels(name: str) -> None:
+def test_what_both_states_share_cancels(name):
     changed = {"poisson_ratio": MEAN_RATIO} | COMMON[name]
     radius = changed.pop("radius", SPHERE.radius)
     worlds = dict.fromkeys(STATES, changed)
@@ -72,7 +72,7 @@ def test_what_both_states_share_cancels(name: str) -> None:
 
 
 @pytest.mark.parametrize("lubricated", [0.0, 0.02])
-def test_the_interval_holds_where_all_is_drawn_from_what_is_stated(lubricated: float) -> None:
+def test_the_interval_holds_where_all_is_drawn_from_what_is_stated(lubricated):
     found = [drawn(lubricated, seed) for seed in range(SEEDS)]
     assert sum(one.held for one in found) >= binom.ppf(CHANCE, SEEDS, 0.93)
     low, high = np.sqrt(chi2.ppf([CHANCE, 1 - CHANCE], SEEDS) / SEEDS)
@@ -80,7 +80,7 @@ def test_the_interval_holds_where_all_is_drawn_from_what_is_stated(lubricated: f
 
 
 @pytest.mark.full_study
-def test_a_lubricated_friction_beyond_its_prior_is_held_by_a_wider_one_or_noticed() -> None:
+def test_a_lubricated_friction_beyond_its_prior_is_held_by_a_wider_one_or_noticed():
     # 0.04 is 2.7 widths of the default prior, and the lubricated loads tell their coefficient to
     # 0.02 only, for a modulus known to 4.5 %: the average stays below 0.02, the dry one 1.7 u low.
     found = [drawn(0.04, seed) for seed in range(SEEDS)]

@@ -68,7 +68,7 @@ def parts(found: ApparatusFunction, *sources: str) -> FloatArray:
 
 
 @pytest.mark.parametrize("kind", SENSORS)
-def test_halves_of_few_places_differ_by_noise_and_baseline_and_share_the_rest(kind: str) -> None:
+def test_halves_of_few_places_differ_by_noise_and_baseline_and_share_the_rest(kind):
     z = []
     errors = []
     shares = []
@@ -95,7 +95,7 @@ def test_halves_of_few_places_differ_by_noise_and_baseline_and_share_the_rest(ki
 
 
 @pytest.mark.parametrize("decay", [7.0, 8.0])
-def test_a_clear_flat_top_is_given_with_its_uncertainty_or_refused_with_numbers(decay) -> None:
+def test_a_clear_flat_top_is_given_with_its_uncertainty_or_refused_with_numbers(decay):
     given = []
     refusals = []
     for seed in range(SEEDS):

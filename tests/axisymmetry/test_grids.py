@@ -44,7 +44,7 @@ def test_a_quarter_plane_gives_the_complex_transform_of_its_mirrored_plane(count
 
 
 @given(count=st.integers(2, 12), seed=SEEDS)
-def test_an_integral_counts_each_pixel_of_the_image_once(count: int, seed: int) -> None:
+def test_an_integral_counts_each_pixel_of_the_image_once(count, seed):
     grid = EvenGrid(count, 0.7)
     field = np.random.default_rng(seed).normal(size=(count, count))
     image = grid.to_image(field)
@@ -57,7 +57,7 @@ def test_an_integral_counts_each_pixel_of_the_image_once(count: int, seed: int) 
 
 
 @given(seed=SEEDS)
-def test_a_lattice_gives_the_direct_sum_about_its_first_point(seed: int) -> None:
+def test_a_lattice_gives_the_direct_sum_about_its_first_point(seed):
     grid, field = random_field(seed)
     dy, dx = grid.spacing
     ky = 2 * np.pi * np.fft.fftfreq(grid.y.size, dy)
@@ -69,7 +69,7 @@ def test_a_lattice_gives_the_direct_sum_about_its_first_point(seed: int) -> None
 
 
 @given(seed=SEEDS)
-def test_what_a_lattice_inverts_it_transforms_back_about_the_central_point(seed: int) -> None:
+def test_what_a_lattice_inverts_it_transforms_back_about_the_central_point(seed):
     grid, field = random_field(seed)
     spectrum = grid.forward(field)
     centred = grid.inverse(spectrum)
@@ -82,7 +82,7 @@ def test_what_a_lattice_inverts_it_transforms_back_about_the_central_point(seed:
 
 
 @given(seed=SEEDS, factor=st.sampled_from([1, 3, 5]))
-def test_a_refined_kernel_keeps_its_values_and_its_integral(seed: int, factor: int) -> None:
+def test_a_refined_kernel_keeps_its_values_and_its_integral(seed, factor):
     grid, kernel = random_field(seed)
     fine, values = grid.refined(kernel, factor)
     assert values.shape == (fine.y.size, fine.x.size)
@@ -96,14 +96,14 @@ def test_a_refined_kernel_keeps_its_values_and_its_integral(seed: int, factor: i
     assert after == pytest.approx(before, abs=1e-9)
 
 
-def test_a_refined_gaussian_is_a_gaussian() -> None:
+def test_a_refined_gaussian_is_a_gaussian():
     grid = Lattice(centred_axis(31, 0.5), centred_axis(25, 0.6))
     fine, values = grid.refined(unit_gaussian(grid.radius, 1.0), 5)
     np.testing.assert_allclose(values, unit_gaussian(fine.radius, 1.0), atol=1e-6)
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_lifting_then_cutting_gives_the_profile_back(seed: int) -> None:
+def test_lifting_then_cutting_gives_the_profile_back(seed):
     rng = np.random.default_rng(seed)
     grid = EvenGrid(65, 0.1)
     weights = rng.normal(size=4)

@@ -25,7 +25,7 @@ def gaussian(r: FloatArray) -> FloatArray:
 
 
 @pytest.mark.parametrize(("power", "jinc"), [(0, j1(K) / K), (1, 2 * jv(2, K) / K**2)])
-def test_a_disc_and_a_paraboloid_become_jincs(power: int, jinc: FloatArray) -> None:
+def test_a_disc_and_a_paraboloid_become_jincs(power, jinc):
     # Sonine: the integral of (1 - r^2) J0(kr) r over the unit disc is 2 J2(k)/k^2.
     r = np.linspace(0.0, 1.0, 9)
     found = hankel_transform(r, (1 - r**2) ** power, K)
@@ -33,14 +33,14 @@ def test_a_disc_and_a_paraboloid_become_jincs(power: int, jinc: FloatArray) -> N
 
 
 @given(width=st.floats(1e-5, 1e3))
-def test_a_gaussian_becomes_a_gaussian_in_any_unit_of_length(width: float) -> None:
+def test_a_gaussian_becomes_a_gaussian_in_any_unit_of_length(width):
     r = width * np.linspace(0.0, 9.0, 600)
     k = np.array([0.0, 0.5, 1.0, 3.0]) / width
     found = hankel_transform(r, unit_gaussian(r, width), k)
     np.testing.assert_allclose(found, np.exp(-((k * width) ** 2) / 2), atol=1e-8)
 
 
-def test_a_point_load_below_a_surface_becomes_an_exponential() -> None:
+def test_a_point_load_below_a_surface_becomes_an_exponential():
     # 1/(1 + r^2)^(3/2) and 2 pi exp(-k) are a pair.  By parts, with (r J1(kr))' = k r J0(kr),
     # what lies beyond R is less than 2 (2 pi) R J1/(k R^3) <= 4 pi/(k R^2) sqrt(2/(pi k R)).
     reach = 2000.0
@@ -52,7 +52,7 @@ def test_a_point_load_below_a_surface_becomes_an_exponential() -> None:
 
 
 @pytest.mark.parametrize("offset", [0.0, 0.5])
-def test_the_error_falls_with_the_fourth_power_of_the_step(offset: float) -> None:
+def test_the_error_falls_with_the_fourth_power_of_the_step(offset):
     k = np.linspace(0.1, 6.0, 12)
     errors = []
     for count in (20, 40, 80, 160):
@@ -64,7 +64,7 @@ def test_the_error_falls_with_the_fourth_power_of_the_step(offset: float) -> Non
 
 
 @pytest.mark.parametrize("start", [0.0, 1e-12, 0.02, 0.1])
-def test_a_spline_has_no_kink_on_the_axis_wherever_the_table_begins(start: float) -> None:
+def test_a_spline_has_no_kink_on_the_axis_wherever_the_table_begins(start):
     r = np.concatenate([[start], np.arange(0.15, 8.0, 0.05)])
     spline = radial_spline(r, np.cos(r))
     inner = np.linspace(0.0, 1.0, 201)
@@ -74,7 +74,7 @@ def test_a_spline_has_no_kink_on_the_axis_wherever_the_table_begins(start: float
 
 
 @given(product=st.floats(1.0, 3000.0), k_max=st.floats(6.5, 60.0))
-def test_nodes_resolve_the_radii_that_they_are_made_for(product: float, k_max: float) -> None:
+def test_nodes_resolve_the_radii_that_they_are_made_for(product, k_max):
     # The weights carry k dk / 2 pi; beyond k_max the Gaussian's transform is below exp(-21).
     r_max = product / k_max
     wavenumbers = Wavenumbers.covering(k_max, r_max)
@@ -96,7 +96,7 @@ def test_nodes_resolve_the_radii_that_they_are_made_for(product: float, k_max: f
         ),
     ],
 )
-def test_synthesis_inverts_transforms_known_in_closed_form(function, transform, k_max) -> None:
+def test_synthesis_inverts_transforms_known_in_closed_form(function, transform, k_max):
     r = np.linspace(0.0, 30.0, 24).reshape(4, 6)
     wavenumbers = Wavenumbers.covering(k_max, 30.0)
     spectrum = RadialSpectrum(wavenumbers, transform(wavenumbers.k))
@@ -104,7 +104,7 @@ def test_synthesis_inverts_transforms_known_in_closed_form(function, transform, 
 
 
 @pytest.mark.parametrize("width", [5e-3, 3e-3, 1e-3])
-def test_a_narrow_peak_in_a_long_table_is_transformed_as_well_as_it_is_tabulated(width: float):
+def test_a_narrow_peak_in_a_long_table_is_transformed_as_well_as_it_is_tabulated(width):
     r = np.concatenate([np.linspace(0, 10 * width, 400), np.linspace(10 * width, 8, 400)[1:]])
     k = np.array([0.0, 1.0, 5.0])
     found = hankel_transform(r, unit_gaussian(r, width), k)
@@ -112,7 +112,7 @@ def test_a_narrow_peak_in_a_long_table_is_transformed_as_well_as_it_is_tabulated
 
 
 @pytest.mark.parametrize(("start", "spread"), [(0.0, 0.4), (0.0, 1.0), (0.05, 1.0)])
-def test_the_slope_of_a_gaussian_has_k_times_its_transform(start: float, spread: float) -> None:
+def test_the_slope_of_a_gaussian_has_k_times_its_transform(start, spread):
     # A table of a vector field need not begin on the axis.
     r = np.linspace(start, 9.0 * spread, 600)
     slope = -r / spread**2 * unit_gaussian(r, spread)
@@ -120,7 +120,7 @@ def test_the_slope_of_a_gaussian_has_k_times_its_transform(start: float, spread:
     np.testing.assert_allclose(found, -K * np.exp(-((K * spread) ** 2) / 2), atol=1e-6)
 
 
-def test_synthesis_of_order_one_takes_a_transform_back_and_has_a_potential() -> None:
+def test_synthesis_of_order_one_takes_a_transform_back_and_has_a_potential():
     wavenumbers = Wavenumbers.covering(9.0, 12.0)
     k = wavenumbers.k
     spectrum = RadialSpectrum(wavenumbers, k * np.exp(-(k**2) / 2), order=1)
@@ -131,7 +131,7 @@ def test_synthesis_of_order_one_takes_a_transform_back_and_has_a_potential() -> 
 
 
 @pytest.mark.parametrize("r_max", [0.5, 3.0, 200.0])
-def test_the_integral_is_the_transform_at_zero(r_max: float) -> None:
+def test_the_integral_is_the_transform_at_zero(r_max):
     # A ring: one Gaussian taken off another; its integral over the plane is 4 pi - pi.
     k = Wavenumbers.covering(12.0, r_max)
     ring = RadialSpectrum(k, 4 * np.pi * np.exp(-(k.k**2)) - np.pi * np.exp(-(k.k**2) / 4))
@@ -148,7 +148,7 @@ def test_no_panel_is_longer_than_allowed_and_none_is_spent_needlessly(upper, lon
     assert weights.sum() == pytest.approx(upper, rel=1e-12)
 
 
-def test_a_table_with_an_edge_is_integrated_as_it_stands() -> None:
+def test_a_table_with_an_edge_is_integrated_as_it_stands():
     radius = 3.175e-3
     r = np.concatenate([np.linspace(0, 3.1749e-3, 20), np.linspace(3.1751e-3, 10e-3, 20)])
     disc = memscal.StressProfile(r=r, sigma_zz=np.where(r < radius, 1e5, 0.0), load=1.0)

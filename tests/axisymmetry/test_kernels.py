@@ -1,7 +1,5 @@
 """Kernels against quadrature in the plane: closed transform and radial function are a pair."""
 
-from typing import Any
-
 import numpy as np
 import pytest
 from helpers.machine import assert_same_to_rounding
@@ -15,7 +13,7 @@ from memscal.model.arrays import FloatArray
 
 
 @given(shares=st.lists(st.floats(-2, 2), min_size=0, max_size=3), data=st.data())
-def test_a_mixture_and_its_transform_belong_together(shares: list[float], data: Any) -> None:
+def test_a_mixture_and_its_transform_belong_together(shares, data):
     weights = (*shares, 1.0 - sum(shares))
     widths = data.draw(
         st.lists(st.floats(0.2e-3, 1e-3), min_size=len(weights), max_size=len(weights))
@@ -35,7 +33,7 @@ def test_a_mixture_and_its_transform_belong_together(shares: list[float], data: 
     ((1.0,), (np.inf,), "above zero"), ((1.0,), (np.nan,), "above zero"),
     ((float("nan"),), (1e-3,), "add up to nan"),
 ])  # fmt: skip
-def test_a_mixture_that_is_no_apparatus_function_is_refused(weights, sigmas, problem) -> None:
+def test_a_mixture_that_is_no_apparatus_function_is_refused(weights, sigmas, problem):
     with pytest.raises(InputError, match=problem):
         GaussianMixture(weights, sigmas)
 
@@ -56,7 +54,7 @@ def blurred_disc(radius: float, sigma: float, r: FloatArray) -> FloatArray:
 @pytest.mark.parametrize(
     ("radius", "sigma"), [(0.8e-3, 0.3e-3), (1.0e-3, 0.08e-3), (0.1e-3, 0.5e-3)]
 )
-def test_a_disc_is_the_sum_of_its_points_gaussians(radius: float, sigma: float) -> None:
+def test_a_disc_is_the_sum_of_its_points_gaussians(radius, sigma):
     disc = SmoothedDisc(radius=radius, sigma=sigma)
     r = np.linspace(0.0, radius + 8 * sigma, 25)
     summed = blurred_disc(radius, sigma, r)
@@ -65,14 +63,14 @@ def test_a_disc_is_the_sum_of_its_points_gaussians(radius: float, sigma: float) 
 
 
 @given(radius=st.floats(0.1e-3, 2e-3), sigma=st.floats(0.1e-3, 1e-3))
-def test_a_disc_and_its_transform_belong_together(radius: float, sigma: float) -> None:
+def test_a_disc_and_its_transform_belong_together(radius, sigma):
     disc = SmoothedDisc(radius=radius, sigma=sigma)
     r = np.linspace(0.0, radius + 8 * sigma, 1500)
     k = np.array([0.0, 0.5e3, 2e3, 6e3])
     np.testing.assert_allclose(hankel_transform(r, disc.radial(r), k), disc.transform(k), atol=1e-6)
 
 
-def test_a_disc_of_no_size_is_its_gaussian_and_one_far_away_is_zero() -> None:
+def test_a_disc_of_no_size_is_its_gaussian_and_one_far_away_is_zero():
     r = np.linspace(0.0, 3e-3, 31)
     point = SmoothedDisc(radius=1e-9, sigma=0.5e-3)
     gaussian = GaussianMixture((1.0,), (0.5e-3,))
@@ -91,6 +89,6 @@ def test_a_disc_of_no_size_is_its_gaussian_and_one_far_away_is_zero() -> None:
         (0.8e-3, np.inf, "width of the Gaussian that blurs the disc"),
     ],
 )
-def test_a_disc_without_a_size_is_refused(radius: float, sigma: float, problem: str) -> None:
+def test_a_disc_without_a_size_is_refused(radius, sigma, problem):
     with pytest.raises(InputError, match=problem):
         SmoothedDisc(radius=radius, sigma=sigma)

@@ -50,7 +50,7 @@ def plain_pipeline(scan: Scan, reference: StressProfile) -> FloatArray:
     return np.asarray(fit)
 
 
-def test_a_calibration_costs_no_more_than_a_few_plain_pipelines(scan, reference) -> None:
+def test_a_calibration_costs_no_more_than_a_few_plain_pipelines(scan, reference):
     apparatus = memscal.calibrate(scan, reference=reference).apparatus
     assert apparatus.conversion_constant == pytest.approx(1e-7, rel=0.03)
     assert apparatus.gaussian_sigma == pytest.approx(561e-6, rel=0.03)
@@ -64,7 +64,7 @@ def test_a_calibration_costs_no_more_than_a_few_plain_pipelines(scan, reference)
     show("calibration, over a plain pipeline", ratio, 4)
 
 
-def test_a_calibration_costs_as_much_as_it_has_points() -> None:
+def test_a_calibration_costs_as_much_as_it_has_points():
     # Beyond what a scan of few points costs; matrices over the points would cost 64 times as much.
     scans = [simulate(points=points, noise=0.003, seed=1) for points in (20_001, 160_001)]
     small, large = (lambda s=s: memscal.calibrate(s) for s in scans)

@@ -43,7 +43,7 @@ def plain_contact(problem: ContactProblem, depth: float) -> FloatArray:
     return whole
 
 
-def test_a_contact_costs_a_few_dense_solutions_and_less_than_least_squares(smooth) -> None:
+def test_a_contact_costs_a_few_dense_solutions_and_less_than_least_squares(smooth):
     right = np.ones(smooth.size)
     depth = contact(smooth).depth
     assert depth == pytest.approx(43.766e-6, rel=1e-4)
@@ -61,7 +61,7 @@ def test_a_contact_costs_a_few_dense_solutions_and_less_than_least_squares(smoot
     show("frictionless contact, over non-negative least squares", ratio, 1)
 
 
-def test_friction_along_a_path_costs_a_few_solutions_per_ring() -> None:
+def test_friction_along_a_path_costs_a_few_solutions_per_ring():
     problem = contact_of_200_rings(0.3)
     rough = problem.compliance
     right = np.ones(2 * problem.size)

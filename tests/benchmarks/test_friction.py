@@ -31,7 +31,7 @@ def family(cache: Path | None) -> ProfileFamily:
     )
 
 
-def test_a_kept_family_is_read_ten_times_faster_than_it_is_calculated(tmp_path: Path) -> None:
+def test_a_kept_family_is_read_ten_times_faster_than_it_is_calculated(tmp_path):
     family(tmp_path)
     pairs = [(once(lambda: family(None)), once(lambda: family(tmp_path))) for _ in range(3)]
     ratio = median(kept / calculated for calculated, kept in pairs)
@@ -41,7 +41,7 @@ def test_a_kept_family_is_read_ten_times_faster_than_it_is_calculated(tmp_path: 
 DATA = Path(__file__).parents[2] / "calibration_data"
 
 
-def test_measured_stress_and_comparison_cost_so_many_calibrations(tmp_path: Path) -> None:
+def test_measured_stress_and_comparison_cost_so_many_calibrations(tmp_path):
     # Processor time over that of one calibration of 65 points, all in one process; docs/speed.md.
     experiment = DATA / "sphere_experiment"
     scan = memscal.read_scan(DATA / "rod_scan_65.h5")

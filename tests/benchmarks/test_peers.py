@@ -74,7 +74,7 @@ def study(name: str) -> dict[str, tuple[float, float]]:
 
 @pytest.mark.parametrize("peer", PEERS)
 @pytest.mark.parametrize("name", NAMES)
-def test_g_is_found_better_than_by(peer: str, name: str) -> None:
+def test_g_is_found_better_than_by(peer, name):
     pytest.importorskip(peer, reason=f"{peer}, a program to compare with, is not installed")
     found = study(name)
     assert found[OURS][0] < FACTORS.get(STUDIED[name].kind, 1.0) * found[peer][0]

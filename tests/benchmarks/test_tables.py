@@ -28,13 +28,13 @@ def work(path: Path) -> None:
     assert read_scan(path.with_suffix(".h5")).u_zz.size == int(path.stem)
 
 
-def test_the_time_of_a_row_does_not_grow_with_their_number(tmp_path: Path) -> None:
+def test_the_time_of_a_row_does_not_grow_with_their_number(tmp_path):
     few, many = (table(tmp_path, rows) for rows in (50_000, 500_000))
     ratio = turns(lambda: work(many), lambda: work(few), rounds=3)
     show("import of 500,000 rows, over that of 50,000", ratio, 2 * 10, gross=2.0)
 
 
-def test_a_table_is_read_as_fast_as_by_numpy(tmp_path: Path) -> None:
+def test_a_table_is_read_as_fast_as_by_numpy(tmp_path):
     path = table(tmp_path, 200_000)
     ratio = turns(
         lambda: import_table(path, x="x", u="u", repeat="pass"),

@@ -2,11 +2,9 @@
 
 import json
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
-from helpers.console import Run
 from helpers.outside import ROUND, A, World, elliptic
 from helpers.outside import scan as outside_scan
 
@@ -35,12 +33,12 @@ def text_of(apparatus: memscal.ApparatusFunction) -> str:
     return " ".join(message.text for message in apparatus.process.messages)
 
 
-def test_every_statement_has_a_size_here() -> None:
+def test_every_statement_has_a_size_here():
     assert set(SIZES) == set(STATED_ERRORS)
 
 
 @pytest.mark.parametrize("name", [name for name in SIZES if name != "baseline_curvature"])
-def test_what_is_stated_is_in_the_budget_by_its_size_for_one_uncertainty(name: str) -> None:
+def test_what_is_stated_is_in_the_budget_by_its_size_for_one_uncertainty(name):
     free = memscal.calibrate(stated()).apparatus
     counted = memscal.calibrate(stated(**{name: SIZES[name]})).apparatus
     line = counted.budget["conversion_constant"][name]
@@ -58,7 +56,7 @@ def test_what_is_stated_is_in_the_budget_by_its_size_for_one_uncertainty(name: s
     assert states[assumption.name] == "stated"
 
 
-def test_a_curved_baseline_is_fitted_with_a_prior_and_counts() -> None:
+def test_a_curved_baseline_is_fitted_with_a_prior_and_counts():
     name = "baseline_curvature"
     lines = []
     uncertainties = []
@@ -74,7 +72,7 @@ def test_a_curved_baseline_is_fitted_with_a_prior_and_counts() -> None:
     assert uncertainties[0] > uncertainties[1] > uncertainties[2]
 
 
-def test_a_true_curvature_of_one_deviation_moves_a_result_by_its_line() -> None:
+def test_a_true_curvature_of_one_deviation_moves_a_result_by_its_line():
     """By scans without noise that states half a percent, of another forward calculation."""
     found = []
     for parabola in (0.0, 0.005):
@@ -91,7 +89,7 @@ def test_a_true_curvature_of_one_deviation_moves_a_result_by_its_line() -> None:
     assert abs(curved.parameters["baseline_curvature"] - 0.005 * top) < u
 
 
-def test_the_mean_of_an_offset_is_corrected() -> None:
+def test_the_mean_of_an_offset_is_corrected():
     u = 0.3e-3
     # By Gauss-Hermite quadrature over offsets, from whose sign nothing depends.
     nodes, weights = np.polynomial.hermite_e.hermegauss(7)
@@ -110,7 +108,7 @@ def test_the_mean_of_an_offset_is_corrected() -> None:
     assert counted["line_offset"] / A == pytest.approx(spread, rel=0.3)
 
 
-def test_a_raster_measures_what_a_line_assumes() -> None:
+def test_a_raster_measures_what_a_line_assumes():
     line = memscal.calibrate(stated()).apparatus
     raster = memscal.calibrate(memscal.simulate(raster=True, points=17, seed=1)).apparatus
     names = {assumption.name for assumption in line.assumptions}
@@ -119,7 +117,7 @@ def test_a_raster_measures_what_a_line_assumes() -> None:
     assert states["roundness"] == states["line_offset"] == "measured"
 
 
-def test_what_the_budget_counts_unasked_is_listed_with_its_size() -> None:
+def test_what_the_budget_counts_unasked_is_listed_with_its_size():
     made = memscal.simulate(seed=5, load=0.6)
     # Half is the largest Poisson's ratio in the table of rods.
     film = replace(made.film, law="", poisson_ratio_uncertainty=None)
@@ -137,19 +135,19 @@ def test_what_the_budget_counts_unasked_is_listed_with_its_size() -> None:
     assert listed["poisson_ratio"].words in text_of(apparatus)
 
 
-def test_of_a_relative_constant_no_load_is_taken_for_granted() -> None:
+def test_of_a_relative_constant_no_load_is_taken_for_granted():
     scan = replace(stated(), load_uncertainty=None)
     for relative in (False, True):
         found = memscal.calibrate(scan, relative=relative).assumptions
         assert ("load_scale" in {assumption.name for assumption in found}) is not relative
 
 
-def test_an_offset_as_in_another_unit_is_refused() -> None:
+def test_an_offset_as_in_another_unit_is_refused():
     with pytest.raises(InputError, match="line offset uncertainty of the scan is 100 mm"):
         memscal.calibrate(stated(line_offset=0.1))
 
 
-def test_assumptions_are_in_file_json_and_text(tmp_path: Path) -> None:
+def test_assumptions_are_in_file_json_and_text(tmp_path):
     calibration = memscal.calibrate(stated())
     path = tmp_path / "a.apparatus.h5"
     calibration.apparatus.save(path)
@@ -166,7 +164,7 @@ def test_assumptions_are_in_file_json_and_text(tmp_path: Path) -> None:
     assert f"{roundness['size_for_one_u']['value']:.2g}" in text
 
 
-def test_options_of_import_state_them(run: Run, tmp_path: Path) -> None:
+def test_options_of_import_state_them(run, tmp_path):
     made = outside_scan(World(), 1)
     rows = "\n".join(f"{x * 1e3:.6g},{u * 1e3:.8g}" for x, u in zip(made.x, made.u_zz, strict=True))
     (tmp_path / "t.csv").write_text(f"x [mm],U [mV]\n{rows}\n", encoding="utf-8")
@@ -207,7 +205,7 @@ def crossed(world: World, *, offset: float = 0.0, seed: int = 1) -> list[memscal
 
 
 @pytest.mark.parametrize("world", [ROUND, elliptic(1.4)], ids=["round", "elliptic"])
-def test_crossed_lines_measure_axis_ratio_and_each_other_s_offset(world: World) -> None:
+def test_crossed_lines_measure_axis_ratio_and_each_other_s_offset(world):
     calibration = memscal.calibrate(crossed(world, offset=0.3e-3))
     apparatus = calibration.apparatus
     # Without the offsets A is 4 % smaller.
@@ -221,14 +219,14 @@ def test_crossed_lines_measure_axis_ratio_and_each_other_s_offset(world: World) 
     assert "at 0.30" in texts[0]
 
 
-def test_lines_of_unlike_zeros_measure_no_offset() -> None:
+def test_lines_of_unlike_zeros_measure_no_offset():
     along, across = crossed(ROUND)
     apparatus = memscal.calibrate([along, replace(across, x=across.x + 5e-3)]).apparatus
     states = {assumption.name: assumption.state for assumption in apparatus.assumptions}
     assert (states["roundness"], states["line_offset"]) == ("measured", "assumed")
 
 
-def test_points_on_two_lines_are_two_lines() -> None:
+def test_points_on_two_lines_are_two_lines():
     lines = crossed(ROUND)
     x = np.concatenate([lines[0].x, np.zeros(lines[1].x.size)]) + 3e-3
     y = np.concatenate([np.zeros(lines[0].x.size), lines[1].x]) - 2e-3

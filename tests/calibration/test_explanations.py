@@ -20,7 +20,7 @@ def wrong() -> memscal.Calibration:
     return memscal.calibrate(replace(made, film=LINEAR_FILM))
 
 
-def test_a_wrong_thickness_is_named_with_its_size(wrong) -> None:
+def test_a_wrong_thickness_is_named_with_its_size(wrong):
     rows = {row["name"]: row for row in wrong.to_dict()["explanations"]}
     assert rows["thickness"]["named"]
     assert re.match(r"a film of \(2\.[12]\d* ± 0\.0\d+\) mm", rows["thickness"]["words"])
@@ -29,7 +29,7 @@ def test_a_wrong_thickness_is_named_with_its_size(wrong) -> None:
     assert rows["thickness"]["log_bayes_factor"] > rows["baseline_curvature"]["log_bayes_factor"]
 
 
-def test_a_curved_baseline_is_named_with_its_whole_size() -> None:
+def test_a_curved_baseline_is_named_with_its_whole_size():
     world = replace(ROUND, parabola=0.03)
     rows = memscal.calibrate(outside_scan(world, 1)).to_dict()["explanations"]
     said = next(row for row in rows if row["name"] == "baseline_curvature")["words"]
@@ -37,7 +37,7 @@ def test_a_curved_baseline_is_named_with_its_whole_size() -> None:
     assert abs(float(size[1]) - 0.03) < 2 * float(size[2])
 
 
-def test_first_lines_checks_and_report_say_so(wrong) -> None:
+def test_first_lines_checks_and_report_say_so(wrong):
     words = wrong.to_dict()["explanations"][0]["words"]
     first, second = wrong.answer().splitlines()
     assert "which A to use is not settled" in first
@@ -49,14 +49,14 @@ def test_first_lines_checks_and_report_say_so(wrong) -> None:
     assert "ln of the Bayes factor" in wrong.report()
 
 
-def test_an_artifact_keeps_what_was_weighed(wrong, tmp_path) -> None:
+def test_an_artifact_keeps_what_was_weighed(wrong, tmp_path):
     wrong.apparatus.save(tmp_path / "sensor.h5")
     read = memscal.load_apparatus(tmp_path / "sensor.h5")
     assert read.to_dict()["explanations"] == wrong.to_dict()["explanations"]
     assert read.answer() == wrong.answer()
 
 
-def test_nothing_is_weighed_where_the_checks_pass() -> None:
+def test_nothing_is_weighed_where_the_checks_pass():
     good = memscal.calibrate(simulated(seed=3))
     assert "explanations" not in good.to_dict()
     assert "suffices" in good.answer()
@@ -78,6 +78,6 @@ def row(name: str, named: bool = True) -> dict:
         ([row("lag", named=False)], "nothing that was weighed, but by larger or slower noise, or"),
     ],
 )
-def test_the_sentence_says_what_is_as_good(rows, text) -> None:
+def test_the_sentence_says_what_is_as_good(rows, text):
     assert text in explanation(rows)
     assert explanation(rows).endswith("or by a cause that is not listed.")

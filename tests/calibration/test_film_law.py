@@ -71,7 +71,7 @@ def test_it_dominates_at_the_papers_load_and_hardly_counts_at_a_light_one(deep):
 
 
 @pytest.mark.parametrize("law", ["", "neo-hookean", "linear"])
-def test_a_deep_rod_fails_only_under_a_film_that_is_stated_to_be_linear(deep, law) -> None:
+def test_a_deep_rod_fails_only_under_a_film_that_is_stated_to_be_linear(deep, law):
     # No rubber slides that deep: where the linear film is stated, none is solved.
     friction = 0.0 if law == "linear" else None
     scan = replace(deep, film=replace(LAWLESS, law=law), rod_friction=friction)

@@ -94,7 +94,7 @@ def stated(item: ElasticFilm | Indenter) -> dict[str, float]:
     return {name: value for name, value in asdict(item).items() if value is not None}
 
 
-def test_the_folder_holds_what_its_readme_lists_and_is_small() -> None:
+def test_the_folder_holds_what_its_readme_lists_and_is_small():
     listed = set(re.findall(r"^\| `([^`]+)`", README, flags=re.MULTILINE))
     paths = [path for path in DATA.rglob("*") if path.suffix in {".h5", ".csv", ".toml"}]
     shipped = {path.relative_to(DATA).as_posix() for path in paths}
@@ -103,11 +103,11 @@ def test_the_folder_holds_what_its_readme_lists_and_is_small() -> None:
 
 
 @pytest.mark.parametrize("name", [*SCANS, *EXPERIMENT, ARTIFACT])
-def test_every_hdf5_file_is_in_order(name: str) -> None:
+def test_every_hdf5_file_is_in_order(name):
     assert [finding for finding in check(DATA / name) if not finding.passed] == []
 
 
-def test_every_file_says_that_it_is_synthetic() -> None:
+def test_every_file_says_that_it_is_synthetic():
     for name in (*SCANS, *EXPERIMENT):
         scan = memscal.read_scan(DATA / name)
         assert scan.synthetic
@@ -119,7 +119,7 @@ def test_every_file_says_that_it_is_synthetic() -> None:
 
 
 @pytest.mark.parametrize("name", [*SCANS, EXPERIMENT[0]])
-def test_a_calibration_finds_the_stored_truth_within_its_uncertainty(name, calibrations) -> None:
+def test_a_calibration_finds_the_stored_truth_within_its_uncertainty(name, calibrations):
     calibration = calibrations[name]
     assert calibration.passed
     scan = memscal.read_scan(DATA / name)
@@ -139,7 +139,7 @@ def test_a_calibration_finds_the_stored_truth_within_its_uncertainty(name, calib
 
 
 @pytest.mark.parametrize("name", [*SCANS, *EXPERIMENT])
-def test_the_readmes_commands_make_the_shipped_scans(name: str, rebuilt: Path) -> None:
+def test_the_readmes_commands_make_the_shipped_scans(name, rebuilt):
     shipped = memscal.read_scan(DATA / name)
     made = memscal.read_scan(rebuilt / name)
     for field in ("x", "y", "x_errors", "u_zz", "u_zz_errors", "normal_load", "normal_load_errors"):
@@ -159,7 +159,7 @@ def test_the_readmes_commands_make_the_shipped_scans(name: str, rebuilt: Path) -
         assert made.synthetic[name] == expected, name
 
 
-def test_the_shipped_artifact_is_what_calibrate_makes_now(rebuilt: Path) -> None:
+def test_the_shipped_artifact_is_what_calibrate_makes_now(rebuilt):
     shipped, made = (memscal.load_apparatus(folder / ARTIFACT) for folder in (DATA, rebuilt))
     assert made.conversion_constant == pytest.approx(shipped.conversion_constant, rel=1e-9)
     assert made.gaussian_sigma == pytest.approx(shipped.gaussian_sigma, rel=1e-9)
@@ -176,7 +176,7 @@ def test_the_shipped_artifact_is_what_calibrate_makes_now(rebuilt: Path) -> None
     )
 
 
-def test_the_tables_are_what_their_generator_makes(generator: ModuleType, tmp_path: Path) -> None:
+def test_the_tables_are_what_their_generator_makes(generator, tmp_path):
     generator.messy_scan(tmp_path / "rod_scan_messy.csv")
     generator.own_experiment(tmp_path / "tables")
     for name in ("rod_scan_messy.csv", *OWN):
@@ -185,7 +185,7 @@ def test_the_tables_are_what_their_generator_makes(generator: ModuleType, tmp_pa
 
 
 @pytest.mark.accuracy
-def test_the_table_of_finite_elements_is_what_its_generator_makes(generator, tmp_path) -> None:
+def test_the_table_of_finite_elements_is_what_its_generator_makes(generator, tmp_path):
     made = tmp_path / "rod_reference_fem.csv"
     generator.finite_element_reference(made)
     assert_allclose(numbers(made), numbers(DATA / made.name), rtol=0, atol=1e-7)
@@ -200,7 +200,7 @@ def test_the_table_of_dry_contacts_becomes_a_scan_with_a_line_for_each_load_and_
         assert_allclose(scan.only_passes(i).normal_load, load)
 
 
-def test_the_messy_table_is_messy_and_still_gives_its_truth(imported: Path) -> None:
+def test_the_messy_table_is_messy_and_still_gives_its_truth(imported):
     scan = memscal.read_scan(imported / "messy.h5")
     # Three rows were never taken, and four readings are empty.
     assert (scan.kind, scan.u_zz.size) == ("points", 3 * 33 - 3)
@@ -213,8 +213,8 @@ def test_the_messy_table_is_messy_and_still_gives_its_truth(imported: Path) -> N
 
 
 def test_the_finite_element_table_moves_the_result_by_less_than_its_error_allows(
-    imported: Path, calibrations: dict[str, memscal.Calibration]
-) -> None:
+    imported, calibrations
+):
     """Bound the shift of A and sigma by what the table changes in the predicted voltages.
 
     To first order the fit changes as if the scan had changed by that, e_i: by Cauchy and Schwarz by

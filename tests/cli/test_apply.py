@@ -1,9 +1,8 @@
 """``memscal apply``: what it prints, what it writes, and its exit codes."""
 
 from dataclasses import replace
-from pathlib import Path
 
-from helpers.console import Run, names
+from helpers.console import names
 from helpers.scans import contact_scan
 
 import memscal
@@ -12,7 +11,7 @@ from memscal.cli.failures import CHECK_FAILED
 LOADS = (0.69, 2.75)
 
 
-def test_a_wrong_gain_fails_the_check_and_is_exit_code_1(run: Run, artifact: Path, folder: Path):
+def test_a_wrong_gain_fails_the_check_and_is_exit_code_1(run, artifact, folder):
     scan = contact_scan(1, load=LOADS, noise=0.001, load_scatter=0.0)
     memscal.write_scan(replace(scan, u_zz=1.2 * scan.u_zz), folder / "gain.h5")
     done = run("apply", artifact, "gain.h5").exits(CHECK_FAILED)

@@ -43,7 +43,7 @@ def refused(run: Run, folder: Path) -> Refused:
         (lambda signal: signal.write_direct(np.full(65, np.nan)), ("missing (NaN)",)),
     ],
 )
-def test_a_file_that_was_spoilt_is_refused(refused: Refused, scan: Path, change, words):
+def test_a_file_that_was_spoilt_is_refused(refused, scan, change, words):
     with h5py.File(scan, "r+") as file:
         del file.attrs["memscal_content_sha256"]
         change(file[SIGNAL])
@@ -69,9 +69,7 @@ def altered(path: Path) -> Path:
     ],
 )
 @pytest.mark.usefixtures("artifact")
-def test_an_altered_file_is_used_by_no_command_unless_that_is_recorded(
-    run: Run, scan: Path, folder: Path, line
-):
+def test_an_altered_file_is_used_by_no_command_unless_that_is_recorded(run, scan, folder, line):
     arguments = line.split()
     altered(scan)
     (folder / "manifest").write_text("scan.h5\n")
@@ -101,12 +99,12 @@ def test_an_altered_file_is_used_by_no_command_unless_that_is_recorded(
         ),
     ],
 )
-def test_a_scan_of_no_use_is_refused(refused: Refused, folder: Path, scan, words):
+def test_a_scan_of_no_use_is_refused(refused, folder, scan, words):
     memscal.write_scan(scan, folder / "scan.h5")
     refused("scan.h5", words=words)
 
 
-def test_a_reference_shorter_than_the_scan_is_refused(refused: Refused, scan: Path, folder: Path):
+def test_a_reference_shorter_than_the_scan_is_refused(refused, scan, folder):
     rod = press_rod(SCAN.film, memscal.Rod(radius=0.25e-3), 1.0)
     memscal.write_reference(rod.profile(np.linspace(0.0, 2e-3, 100)), folder / "short.h5")
     for further in ([], ["--dry-run"]):

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from helpers.console import Run, names
+from helpers.console import names
 from helpers.scans import pressed, sphere_scan
 from matplotlib.figure import Figure
 
@@ -42,7 +42,7 @@ def no_computing(monkeypatch: Patch) -> None:
 
 @pytest.mark.usefixtures("no_computing")
 @pytest.mark.parametrize("spelling", ["scan.h5", "./scan.h5", "link.h5", "twin.h5"])
-def test_an_output_is_never_an_input_even_if_forced(run: Run, scan: Path, folder: Path, spelling):
+def test_an_output_is_never_an_input_even_if_forced(run, scan, folder, spelling):
     before = scan.read_bytes()
     (folder / "link.h5").symlink_to("scan.h5")
     (folder / "twin.h5").hardlink_to(folder / "scan.h5")
@@ -51,7 +51,7 @@ def test_an_output_is_never_an_input_even_if_forced(run: Run, scan: Path, folder
 
 
 @pytest.mark.usefixtures("no_computing")
-def test_a_report_does_not_replace_the_reference(run: Run, scan: Path):
+def test_a_report_does_not_replace_the_reference(run, scan):
     run("reference", "rod", "-o", "rod.h5")
     before = Path("rod.h5").read_bytes()
     run("calibrate", scan, "--reference", "rod.h5", "--report", "rod.h5", "--force").exits(4)
@@ -72,7 +72,7 @@ def test_a_report_does_not_replace_the_reference(run: Run, scan: Path):
     ],
 )
 @pytest.mark.usefixtures("artifact", "scan")
-def test_an_old_output_is_replaced_only_if_forced(run: Run, folder: Path, name, line):
+def test_an_old_output_is_replaced_only_if_forced(run, folder, name, line):
     arguments = line.split()
     memscal.write_scan(sphere_scan(pressed(), seed=5), "sphere.h5")
     (folder / name).write_bytes(OLD)
@@ -83,15 +83,13 @@ def test_an_old_output_is_replaced_only_if_forced(run: Run, folder: Path, name, 
     assert (folder / name).read_bytes()[:4] in (b"\x89HDF", b"\x89PNG", b"<!DO")
 
 
-def test_a_figure_that_fails_leaves_nothing(run: Run, scan: Path, folder: Path, monkeypatch: Patch):
+def test_a_figure_that_fails_leaves_nothing(run, scan, folder, monkeypatch):
     monkeypatch.setattr(PLOT, raising(ZeroDivisionError("division by zero")))
     run("calibrate", scan, "--figure", "a.png").exits(70)
     assert names(folder) == ["scan.h5"]
 
 
-def test_where_one_output_cannot_be_replaced_all_stay(
-    run: Run, scan: Path, folder: Path, monkeypatch: Patch
-):
+def test_where_one_output_cannot_be_replaced_all_stay(run, scan, folder, monkeypatch):
     rename = os.replace
 
     def replace(source: Path, target: Path) -> None:
@@ -120,16 +118,14 @@ def test_where_one_output_cannot_be_replaced_all_stay(
         ("simulate --experiment sphere -o loop", 4),
     ],
 )
-def test_a_circle_of_links_is_refused(run: Run, scan: Path, folder: Path, line, code):
+def test_a_circle_of_links_is_refused(run, scan, folder, line, code):
     for ending in ("", ".svg"):
         (folder / f"loop{ending}").symlink_to(f"circle{ending}")
         (folder / f"circle{ending}").symlink_to(f"loop{ending}")
     run(*line.split()).exits(code, "loop")
 
 
-def test_an_input_without_permission_is_refused_and_no_usage_error(
-    run: Run, scan: Path, monkeypatch: Patch
-):
+def test_an_input_without_permission_is_refused_and_no_usage_error(run, scan, monkeypatch):
     """The permission is taken away for root, too."""
 
     def denied(path: object, *arguments: object, **options: object) -> int:
@@ -140,7 +136,7 @@ def test_an_input_without_permission_is_refused_and_no_usage_error(
     run("inspect", scan).exits(3, "cannot be read: Permission denied", "permissions")
 
 
-def test_an_internal_error_has_no_traceback(run: Run, scan: Path, monkeypatch: Patch):
+def test_an_internal_error_has_no_traceback(run, scan, monkeypatch):
     monkeypatch.setattr(CALIBRATE, raising(RuntimeError("the flux capacitor\nis empty")))
     failed = run("calibrate", scan).exits(70)
     assert "memscal failed by a fault of its own" in failed.err
@@ -151,7 +147,7 @@ def test_an_internal_error_has_no_traceback(run: Run, scan: Path, monkeypatch: P
         run(*arguments).exits(70, "Traceback", "flux capacitor")
 
 
-def test_running_out_of_memory_is_said_so(run: Run, scan: Path, monkeypatch: Patch):
+def test_running_out_of_memory_is_said_so(run, scan, monkeypatch):
     monkeypatch.setattr(CALIBRATE, raising(MemoryError()))
     run("calibrate", scan).exits(70, "out of memory")
 
@@ -167,7 +163,7 @@ def meanwhile(monkeypatch: Patch) -> Callable[[Callable[[], object]], None]:
     return happens
 
 
-def test_a_python_warning_becomes_one_line(run: Run, scan: Path, meanwhile):
+def test_a_python_warning_becomes_one_line(run, scan, meanwhile):
     def warn() -> None:
         with warnings.catch_warnings():
             warnings.simplefilter("always")
@@ -180,7 +176,7 @@ def test_a_python_warning_becomes_one_line(run: Run, scan: Path, meanwhile):
 
 @pytest.mark.parametrize("name", ["out.h5", "out.png"])
 def test_a_file_that_appears_during_the_computing_is_not_replaced(
-    run: Run, scan: Path, folder: Path, meanwhile, name
+    run, scan, folder, meanwhile, name
 ):
     meanwhile(lambda: (folder / name).write_bytes(OLD))
     run("calibrate", scan, "-o", "out.h5", "--figure", "out.png").exits(4)

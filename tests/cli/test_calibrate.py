@@ -4,14 +4,14 @@ import shutil
 from pathlib import Path
 
 import pytest
-from helpers.console import Run, names
+from helpers.console import names
 from helpers.scans import simulate
 
 import memscal
 from memscal.cli.options import si
 
 
-def test_a_failed_check_is_exit_code_1_and_marked(run: Run, drifting_scan: Path, folder: Path):
+def test_a_failed_check_is_exit_code_1_and_marked(run, drifting_scan, folder):
     done = run("calibrate", drifting_scan, "-o", "out.h5", "--json").exits(1)
     assert {c["name"]: c["passed"] for c in done.json["checks"]}["baseline_drift"] is False
     apparatus = memscal.load_apparatus("out.h5")
@@ -20,7 +20,7 @@ def test_a_failed_check_is_exit_code_1_and_marked(run: Run, drifting_scan: Path,
     assert "out.h5 was written and is marked" in done.err
 
 
-def test_a_dry_run_checks_everything_and_writes_nothing(run: Run, scan: Path, folder: Path):
+def test_a_dry_run_checks_everything_and_writes_nothing(run, scan, folder):
     done = run("calibrate", scan, "--dry-run", "--figure", "a.png", "--report", "a.html").exits(0)
     for name in ("scan.apparatus.h5", "a.png", "a.html", "65 points", "rod, solved on the film"):
         assert name in done.out
@@ -35,7 +35,7 @@ def lawless(folder: Path) -> Path:
     return path
 
 
-def test_a_reference_of_another_film_is_refused_or_its_override_recorded(run: Run, lawless: Path):
+def test_a_reference_of_another_film_is_refused_or_its_override_recorded(run, lawless):
     run("reference", "rod", "--thickness", "2.1", "-o", "thick.h5")
     both = "2 mm (u 0.02) in the scan scan.h5, 2.1 mm (u not stated) in the reference thick.h5"
     for further in ([], ["--dry-run"]):
@@ -49,9 +49,7 @@ def test_a_reference_of_another_film_is_refused_or_its_override_recorded(run: Ru
     assert [f"Overridden: {text}." for text in process.configuration["override"]] == [message.text]
 
 
-def test_a_method_its_options_and_its_seed_reach_the_artifact(
-    run: Run, scan: Path, monkeypatch: pytest.MonkeyPatch
-):
+def test_a_method_its_options_and_its_seed_reach_the_artifact(run, scan, monkeypatch):
     monkeypatch.setattr("memscal.calibration.drawn_scatter.draw_count", lambda _: 3)
     options = ["--method", "white-noise-draw", "--option", "amplitude=0.5", "--seed", 6]
     told = run("calibrate", scan, *options, "-o", "out.h5", "--json").json
@@ -61,7 +59,7 @@ def test_a_method_its_options_and_its_seed_reach_the_artifact(
     assert configuration["seed"] == 6
 
 
-def test_the_name_of_the_artifact_keeps_what_is_no_suffix(run: Run, good_scan: Path, folder: Path):
+def test_the_name_of_the_artifact_keeps_what_is_no_suffix(run, good_scan, folder):
     shutil.copy(good_scan, folder / "film_0.5mm")
     assert run("calibrate", "film_0.5mm").code == 0
     assert (folder / "film_0.5mm.apparatus.h5").is_file()

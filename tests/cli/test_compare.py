@@ -50,7 +50,7 @@ QUICK = ("--friction", 0.2, "--friction", 0.1, "--loading", "incremental")
 
 
 @pytest.mark.usefixtures("folder")
-def test_measured_stress_gives_the_numbers_of_its_scans(run: Run, compare: Run, bench: Path):
+def test_measured_stress_gives_the_numbers_of_its_scans(run, compare, bench):
     scans = ("dry.h5", "lubricated.h5")
     written = bench / "contacts.stress.h5"
     run("apply", bench / "sensor.apparatus.h5", *(bench / n for n in scans), "-o", written)
@@ -65,7 +65,7 @@ def test_measured_stress_gives_the_numbers_of_its_scans(run: Run, compare: Run, 
     assert names(Path.cwd()) == []
 
 
-def test_stress_of_another_sensor_is_refused(run: Run, compare: Run, bench: Path, folder: Path):
+def test_stress_of_another_sensor_is_refused(run, compare, bench, folder):
     known = memscal.load_apparatus(bench / "sensor.apparatus.h5")
     replace(known, load=2 * known.load).save(folder / "other.apparatus.h5")
     written = folder / "dry.stress.h5"
@@ -78,7 +78,7 @@ def test_stress_of_another_sensor_is_refused(run: Run, compare: Run, bench: Path
     compare(*QUICK, scans=both).exits(REFUSED, "other.apparatus.h5")
 
 
-def test_a_failed_check_is_exit_code_1_after_the_results(compare: Run, monkeypatch: Patch):
+def test_a_failed_check_is_exit_code_1_after_the_results(compare, monkeypatch):
     found = comparison(lubrications=("dry",), failed=True)
     monkeypatch.setattr("memscal.friction.compare.compare", lambda *_, **__: found)
     done = compare()
@@ -86,7 +86,7 @@ def test_a_failed_check_is_exit_code_1_after_the_results(compare: Run, monkeypat
     assert "Effective friction coefficient" in done.out
 
 
-def test_the_cache_is_the_users_own(monkeypatch: Patch, tmp_path: Path):
+def test_the_cache_is_the_users_own(monkeypatch, tmp_path):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     assert user_cache_folder() == tmp_path / "memscal" / "contacts"
     assert cache_from(None, no_cache=True) is None

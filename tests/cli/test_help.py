@@ -4,7 +4,6 @@ import re
 
 import click
 import pytest
-from helpers.console import Run
 
 from memscal.cli.commands import COMMANDS, memscal
 from memscal.cli.options import Quantity
@@ -38,5 +37,5 @@ def test_every_option_with_a_unit_says_it_in_words():
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
-def test_a_shell_gets_its_completion_script(run: Run, shell):
+def test_a_shell_gets_its_completion_script(run, shell):
     assert f"_MEMSCAL_COMPLETE={shell}_complete" in run("completion", shell).exits(0).out

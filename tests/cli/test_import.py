@@ -1,9 +1,6 @@
 """``memscal import``."""
 
-from pathlib import Path
-
 import numpy as np
-from helpers.console import Run
 
 import memscal
 
@@ -13,7 +10,7 @@ OPTIONS = (
 )
 
 
-def test_a_log_of_presses_is_averaged_and_drawn(run: Run, folder: Path):
+def test_a_log_of_presses_is_averaged_and_drawn(run, folder):
     x = np.repeat(np.linspace(-8, 8, 17), 20)
     load = np.tile(np.repeat([0.0, 1.0], 10), 17)
     noise = np.random.default_rng(1).normal(size=(2, x.size)) * 1e-3
@@ -26,7 +23,7 @@ def test_a_log_of_presses_is_averaged_and_drawn(run: Run, folder: Path):
     np.testing.assert_allclose(scan.u_zz, 1e-3 * np.exp(-(scan.x**2) * 1e6), atol=2e-6)
 
 
-def test_a_depth_tells_the_presses_and_is_not_kept(run: Run, folder: Path):
+def test_a_depth_tells_the_presses_and_is_not_kept(run, folder):
     x = np.repeat(np.linspace(-8, 8, 17), 20)
     down = np.tile(np.repeat([0.0, 1.0], 10), 17)
     noise = np.random.default_rng(1).normal(size=x.size) * 1e-3

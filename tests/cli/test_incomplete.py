@@ -1,11 +1,9 @@
 """Scans that lack one quantity, or two: what is missing, and what can be had all the same."""
 
 from itertools import combinations
-from pathlib import Path
 
 import numpy as np
 import pytest
-from helpers.console import Run
 
 FILM = "--young-modulus=2.2 --poisson-ratio=0.5 --thickness=2"
 STATED = f"--load=1 --radius=0.25 {FILM} --x-unit=mm --u-unit=mV".split()
@@ -14,7 +12,7 @@ LACKING = [*combinations(STATED, 1), *combinations(STATED, 2), (*FILM.split(), "
 
 
 @pytest.mark.parametrize("lacking", LACKING, ids="".join)
-def test_a_message_names_what_is_missing_and_what_does_without_it(lacking, folder: Path, run: Run):
+def test_a_message_names_what_is_missing_and_what_does_without_it(lacking, folder, run):
     x = np.linspace(-6, 6, 49)
     table = np.transpose([x, 2 * np.exp(-(x**2) / 2)])
     np.savetxt("rod.csv", table, delimiter=",", header="x,U", comments="")

@@ -1,13 +1,11 @@
 """``memscal inspect`` and ``memscal check``."""
 
 import re
-from pathlib import Path
 
 import h5py
-from helpers.console import Run
 
 
-def test_inspect_speaks_the_units_of_the_command_line(run: Run, folder: Path):
+def test_inspect_speaks_the_units_of_the_command_line(run, folder):
     run("simulate", "-o", "scan.h5", "--seed", 1)
     with h5py.File("scan.h5", "r+") as file:  # as another program may write it
         del file.attrs["memscal_content_sha256"]
@@ -19,7 +17,7 @@ def test_inspect_speaks_the_units_of_the_command_line(run: Run, folder: Path):
     assert quantities["thickness"]["unit"] == "um"
 
 
-def test_check_finds_a_number_that_was_changed(run: Run, artifact: Path):
+def test_check_finds_a_number_that_was_changed(run, artifact):
     with h5py.File(artifact, "r+") as file:
         file["/entry/parameters/conversion_constant"][()] *= 1.01
     done = run("check", artifact, "--json").exits(3)

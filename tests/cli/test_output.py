@@ -47,7 +47,7 @@ def at_terminal(monkeypatch: pytest.MonkeyPatch) -> Terminal:
     return both
 
 
-def test_a_terminal_gets_bold_titles_and_failures_in_red(monkeypatch: pytest.MonkeyPatch):
+def test_a_terminal_gets_bold_titles_and_failures_in_red(monkeypatch):
     terminal = at_terminal(monkeypatch)
     emit_tables(TABLE)
     title, *_, failed = terminal.getvalue().splitlines()
@@ -57,7 +57,7 @@ def test_a_terminal_gets_bold_titles_and_failures_in_red(monkeypatch: pytest.Mon
 
 
 @pytest.mark.parametrize("name", ["NO_COLOR", "TERM"])
-def test_without_colour_nothing_is_bold(monkeypatch: pytest.MonkeyPatch, name: str):
+def test_without_colour_nothing_is_bold(monkeypatch, name):
     terminal = at_terminal(monkeypatch)
     monkeypatch.setenv(name, "dumb")
     emit_tables(TABLE)
@@ -73,7 +73,7 @@ WIDE = Table(
 
 
 @pytest.mark.parametrize("width", [40, 60, 80, 120])
-def test_columns_wrap_beside_their_labels_and_none_is_lost(width: int):
+def test_columns_wrap_beside_their_labels_and_none_is_lost(width):
     lines = WIDE.plain(width).splitlines()
     assert max(map(len, lines)) <= width
     for row in (1, 2):
@@ -93,7 +93,7 @@ def wait_for(shown: Callable[[], str], pattern: str) -> None:
         time.sleep(0.001)
 
 
-def test_progress_is_counted_on_a_terminal_and_leaves_no_trace(monkeypatch: pytest.MonkeyPatch):
+def test_progress_is_counted_on_a_terminal_and_leaves_no_trace(monkeypatch):
     terminal = at_terminal(monkeypatch)
     monkeypatch.setattr("memscal.cli.output._ON_TERMINAL", (0.0, 0.001))
     with working("Drawing"):

@@ -10,7 +10,7 @@ FULL = Path("/dev/full")
 NEEDS_FULL = pytest.mark.skipif(not FULL.exists(), reason="The system has no /dev/full.")
 
 
-def test_a_reader_that_goes_away_is_no_failure(scan: Path, folder: Path):
+def test_a_reader_that_goes_away_is_no_failure(scan, folder):
     reading, writing = os.pipe()
     os.close(reading)
     try:
@@ -21,7 +21,7 @@ def test_a_reader_that_goes_away_is_no_failure(scan: Path, folder: Path):
 
 
 @pytest.mark.parametrize("unbuffered", ["", "1"])
-def test_results_that_cannot_be_printed_are_exit_code_4(scan: Path, folder: Path, unbuffered):
+def test_results_that_cannot_be_printed_are_exit_code_4(scan, folder, unbuffered):
     with (folder / "shown.txt").open("w") as shown:
         stream = {"cwd": folder, "stdout": shown.fileno(), "limit": 16}
         done = run_program("inspect", "scan.h5", **stream, PYTHONUNBUFFERED=unbuffered)
@@ -33,7 +33,7 @@ def test_results_that_cannot_be_printed_are_exit_code_4(scan: Path, folder: Path
 @NEEDS_FULL
 @pytest.mark.parametrize("arguments", [["--help"], ["calibrate", "--help"], ["--version"]])
 @pytest.mark.parametrize("unbuffered", ["", "1"])
-def test_help_that_cannot_be_printed_is_exit_code_4(folder: Path, arguments, unbuffered):
+def test_help_that_cannot_be_printed_is_exit_code_4(folder, arguments, unbuffered):
     with FULL.open("w") as full:
         stream = {"cwd": folder, "stdout": full.fileno(), "PYTHONUNBUFFERED": unbuffered}
         done = run_program(*arguments, **stream)
@@ -41,7 +41,7 @@ def test_help_that_cannot_be_printed_is_exit_code_4(folder: Path, arguments, unb
 
 
 @NEEDS_FULL
-def test_a_result_that_cannot_be_printed_is_not_written_either(folder: Path):
+def test_a_result_that_cannot_be_printed_is_not_written_either(folder):
     with FULL.open("w") as full:
         done = run_program("reference", "rod", "-o", "rod.h5", cwd=folder, stdout=full.fileno())
     assert done.returncode == 4
@@ -49,7 +49,7 @@ def test_a_result_that_cannot_be_printed_is_not_written_either(folder: Path):
     assert os.listdir(folder) == []
 
 
-def test_a_terminal_without_the_characters_still_shows_the_right_number(scan: Path, folder: Path):
+def test_a_terminal_without_the_characters_still_shows_the_right_number(scan, folder):
     done = run_program("calibrate", "scan.h5", cwd=folder, PYTHONIOENCODING="ascii")
     assert done.returncode == 0, done.stderr
     assert done.stdout.isascii()
@@ -58,7 +58,7 @@ def test_a_terminal_without_the_characters_still_shows_the_right_number(scan: Pa
     assert "e-5 mV/Pa" in line
 
 
-def test_a_wrong_clock_is_refused_in_our_words(scan: Path, folder: Path):
+def test_a_wrong_clock_is_refused_in_our_words(scan, folder):
     done = run_program("calibrate", "scan.h5", cwd=folder, SOURCE_DATE_EPOCH="yesterday")
     assert done.returncode == 3
     assert "SOURCE_DATE_EPOCH is 'yesterday'" in done.stderr

@@ -1,16 +1,13 @@
 """``memscal reference``."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
-from helpers.console import Run
 
 import memscal
 
 
 @pytest.mark.parametrize("law", [["--strain", "finite"], ["--film-law", "neo-hookean"]])
-def test_finite_strain_is_a_reference_like_any_other(run: Run, folder: Path, law):
+def test_finite_strain_is_a_reference_like_any_other(run, folder, law):
     done = run("reference", "rod", "--load", 0.02, *law, "-o", "finite.h5").exits(0)
     assert "sticking (fem, neo-Hookean)" in done.out
     profile = memscal.read_reference("finite.h5")
@@ -20,7 +17,7 @@ def test_finite_strain_is_a_reference_like_any_other(run: Run, folder: Path, law
     assert "inf" in next(x for x in run("inspect", "finite.h5").out.splitlines() if "fricti" in x)
 
 
-def test_small_strain_is_linear_whatever_the_law(run: Run):
+def test_small_strain_is_linear_whatever_the_law(run):
     own = run("reference", "rod", "--json").json["solutions"]
     law = ["--film-law", "neo-hookean", "--strain", "linear"]
     assert run("reference", "rod", *law, "--json").json["solutions"] == own
@@ -28,7 +25,7 @@ def test_small_strain_is_linear_whatever_the_law(run: Run):
 
 
 @pytest.mark.parametrize("way", [["--backend", "fem", "--rings", 16], ["--strain", "finite"]])
-def test_the_field_goes_to_a_mesh_that_can_be_imported(run: Run, folder: Path, way):
+def test_the_field_goes_to_a_mesh_that_can_be_imported(run, folder, way):
     run("reference", "sphere", "--load", 0.34, *way, "--mesh", "film.vtu", "-o", "film.h5").exits(0)
     units = ["--r-unit", "mm", "--sigma", "stress_Pa", "--sigma-unit", "Pa", "--load", 0.34]
     run("import", "film.vtu", "-o", "back.h5", "--format", "reference", *units).exits(0)

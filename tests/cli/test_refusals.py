@@ -202,18 +202,18 @@ def refused(run: Run, scan: Path, artifact: Path, folder: Path) -> Callable[...,
 
 
 @pytest.mark.parametrize("line", WRONG_USAGE)
-def test_wrong_usage_is_exit_code_2_with_a_hint(refused, line: str) -> None:
+def test_wrong_usage_is_exit_code_2_with_a_hint(refused, line):
     refused(2, line, WRONG_USAGE[line], "--help")
 
 
 @pytest.mark.filterwarnings("default::memscal.errors.UnitWarning")
 @pytest.mark.parametrize("line", INVALID)
-def test_an_input_that_cannot_be_used_is_exit_code_3(refused, line: str) -> None:
+def test_an_input_that_cannot_be_used_is_exit_code_3(refused, line):
     refused(3, line, INVALID[line])
 
 
 @pytest.mark.parametrize("line", NOT_WRITTEN)
-def test_an_output_that_cannot_be_written_is_exit_code_4(refused, line, monkeypatch) -> None:
+def test_an_output_that_cannot_be_written_is_exit_code_4(refused, line, monkeypatch):
     computing = "The calibration was reached."
     name = "memscal.calibration.calibrate.calibrate"
     monkeypatch.setattr(name, lambda *_, **__: pytest.fail(computing))

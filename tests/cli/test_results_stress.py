@@ -39,14 +39,14 @@ def planned() -> memscal.Design:
 
 
 @pytest.mark.parametrize("name", ["stress", "restored", "contact", "planned"])
-def test_mapping_notebook_and_arrays(name, request: pytest.FixtureRequest):
+def test_mapping_notebook_and_arrays(name, request):
     result = request.getfixturevalue(name)
     assert json.loads(json.dumps(result.to_dict(), allow_nan=False)) == result.to_dict()
     assert all(variable.attrs for variable in result.to_xarray().variables.values())
     assert len(result.to_dataframe()) > 10
 
 
-def test_arrays_are_in_si_units_and_tables_in_shown_ones(stress: memscal.MeasuredStress):
+def test_arrays_are_in_si_units_and_tables_in_shown_ones(stress):
     arrays = stress.to_xarray()
     table = stress.to_dataframe()
     assert arrays.s_zz.dims == ("profile", "point")
@@ -59,7 +59,7 @@ def test_arrays_are_in_si_units_and_tables_in_shown_ones(stress: memscal.Measure
     assert len(table) == sum(profile.r.size for profile in stress.profiles)
 
 
-def test_forces_of_one_sensor_are_correlated(stress: memscal.MeasuredStress):
+def test_forces_of_one_sensor_are_correlated(stress):
     numbers = stress.ufloats()
     first, second = stress.profiles
     assert numbers["force_1"].nominal_value == first.force
@@ -70,7 +70,7 @@ def test_forces_of_one_sensor_are_correlated(stress: memscal.MeasuredStress):
     assert total.std_dev < first.force_uncertainty + second.force_uncertainty
 
 
-def test_numbers_of_a_restoration_have_their_joint_covariance(restored: memscal.Restoration):
+def test_numbers_of_a_restoration_have_their_joint_covariance(restored):
     numbers = restored.ufloats()
     assert list(numbers) == ["force", "stress_on_axis", "centre", "baseline"]
     assert numbers["force"].nominal_value == pytest.approx(restored.force)
@@ -104,7 +104,7 @@ def test_a_contact_varies_with_its_film_and_indenter():
     assert pressed_in.std_dev == pytest.approx((more.depth - less.depth) / 2, rel=1e-3)
 
 
-def test_a_contact_that_was_unloaded_is_not_varied(contact: memscal.Contact):
+def test_a_contact_that_was_unloaded_is_not_varied(contact):
     sphere = memscal.Sphere(radius=0.1288)
     released = memscal.indent(contact.film, sphere, load=[1.0, 0.4], friction=0.3)[1]
     with pytest.raises(InputError, match="not reached by loading alone"):

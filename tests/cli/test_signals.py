@@ -58,7 +58,7 @@ def ends(process: subprocess.Popen[str], folder: Path, code: int) -> None:
     assert {(folder / name).read_bytes() for name in OUTPUTS} == {OLD}
 
 
-def test_a_signal_that_is_ignored_stays_ignored(folder: Path):
+def test_a_signal_that_is_ignored_stays_ignored(folder):
     with started(folder) as process:
         process.send_signal(signal.SIGHUP)
         time.sleep(0.2)
@@ -69,7 +69,7 @@ def test_a_signal_that_is_ignored_stays_ignored(folder: Path):
 
 @pytest.mark.parametrize(("number", "code"), ENDING)
 @pytest.mark.parametrize("module", ["memscal.cli", "memscal.cli.output", "memscal.model.checks"])
-def test_a_signal_during_an_import_has_no_traceback(tmp_path: Path, number, code, module):
+def test_a_signal_during_an_import_has_no_traceback(tmp_path, number, code, module):
     """Wherever the program is while it starts: within an exec of text, too."""
     hook = (
         "import os, sys\n"
@@ -94,7 +94,7 @@ def test_a_signal_during_an_import_has_no_traceback(tmp_path: Path, number, code
 
 @pytest.mark.parametrize(("number", "code"), ENDING)
 @pytest.mark.parametrize("destructor", [False, True])
-def test_a_signal_ends_the_program_wherever_it_comes(tmp_path: Path, number, code, destructor):
+def test_a_signal_ends_the_program_wherever_it_comes(tmp_path, number, code, destructor):
     """Python kills itself by SIGINT after one in text that is run; in a destructor it is lost."""
     place = "class Late:\n    __del__ = lambda _: os.kill(os.getpid(), {n})\nLate(); time.sleep(9)"
     text = place if destructor else "os.kill(os.getpid(), {n})"

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from helpers.console import Run, names
+from helpers.console import names
 from helpers.scans import shear_scan, simulate_experiment
 
 import memscal
@@ -18,7 +18,7 @@ def sheared(folder: Path) -> Path:
     return path
 
 
-def test_the_channel_goes_to_an_artifact_of_its_own_by_method_bayesian(run: Run, sheared: Path):
+def test_the_channel_goes_to_an_artifact_of_its_own_by_method_bayesian(run, sheared):
     done = run("calibrate", sheared, "--channel", "xz", "--json").exits(0)
     assert done.json["method"] == "bayesian"
     assert "experimental" in done.err
@@ -26,9 +26,7 @@ def test_the_channel_goes_to_an_artifact_of_its_own_by_method_bayesian(run: Run,
     assert names(sheared.parent) == ["scan.apparatus.h5", "scan.h5", "scan.xz.apparatus.h5"]
 
 
-def test_the_shear_of_a_contact_is_compared_with_its_channel_s_artifact(
-    run: Run, folder: Path, monkeypatch: pytest.MonkeyPatch
-):
+def test_the_shear_of_a_contact_is_compared_with_its_channel_s_artifact(run, folder, monkeypatch):
     monkeypatch.setattr("os.cpu_count", lambda: 1)
     made = simulate_experiment(
         friction=0.1,

@@ -3,12 +3,10 @@
 import shutil
 from pathlib import Path
 
-from helpers.console import Run
-
 SPHERE = Path(__file__).parents[2] / "calibration_data" / "sphere_experiment"
 
 
-def test_a_load_of_several_is_restored_by_its_number(run: Run, folder: Path) -> None:
+def test_a_load_of_several_is_restored_by_its_number(run, folder):
     shutil.copy(SPHERE / "sphere_dry.h5", "dry.h5")
     run("calibrate", SPHERE / "rod_scan.h5", "-o", "sensor.h5")
     restore = ("restore", "sensor.h5", "dry.h5")
@@ -19,6 +17,6 @@ def test_a_load_of_several_is_restored_by_its_number(run: Run, folder: Path) -> 
     run(*restore, "--load", 2).exits(3, "0.34, 0.69, 1.37, 2.75 N", "none of 2 N")
 
 
-def test_explain_knows_each_check_by_the_names_of_tables_and_files(run: Run) -> None:
+def test_explain_knows_each_check_by_the_names_of_tables_and_files(run):
     assert run("explain", "joint_chi_square_dry").out.startswith("joint chi square\n")
     assert run("explain", "applied-force").out == run("explain", "applied_force_12").out

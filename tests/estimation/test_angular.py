@@ -18,7 +18,7 @@ RADII = np.array([0.3e-3, 0.8e-3])
 ONE_EACH = tuple(np.eye(2) for _ in range(2 * len(ORDERS)))
 
 
-def test_kernels_are_blurred_rings_of_their_order() -> None:
+def test_kernels_are_blurred_rings_of_their_order():
     blur = 0.25e-3
     axis = np.arange(-30, 31) * 0.1e-3
     x, y = (a.ravel() for a in np.meshgrid(axis, axis))
@@ -35,7 +35,7 @@ def test_kernels_are_blurred_rings_of_their_order() -> None:
         np.testing.assert_allclose(kernels[:, column], ring, atol=2e-5 * np.abs(ring).max())
 
 
-def test_signals_are_the_convolutions_of_the_kernels() -> None:
+def test_signals_are_the_convolutions_of_the_kernels():
     scan = simulated(raster=True, points=17, half_range=4e-3)
     model = estimated(scan).model
     step = 0.05e-3
@@ -56,7 +56,7 @@ def test_signals_are_the_convolutions_of_the_kernels() -> None:
 
 
 @pytest.mark.parametrize("side", [33, pytest.param(49, marks=pytest.mark.full_study)])
-def test_noise_of_a_raster_is_not_what_is_not_round(side: int) -> None:
+def test_noise_of_a_raster_is_not_what_is_not_round(side):
     ratios = []
     seeds = 10 if FULL else 2
     for seed in range(seeds):
@@ -73,7 +73,7 @@ def test_noise_of_a_raster_is_not_what_is_not_round(side: int) -> None:
     assert np.mean(ratios) == pytest.approx(1.0, abs=0.03 * np.sqrt(10 / seeds))
 
 
-def test_noise_by_repeats_is_that_within_each_place() -> None:
+def test_noise_by_repeats_is_that_within_each_place():
     scan = tailed_raster(seed=1, side=33)
     x, y = (np.tile(a.ravel(), 2) for a in scan.positions)
     again = tailed_raster(seed=2, side=33)
@@ -93,7 +93,7 @@ def test_noise_by_repeats_is_that_within_each_place() -> None:
     assert noise.deviation == pytest.approx(scan.synthetic["noise"], rel=0.1)
 
 
-def test_a_spike_is_an_outlier_and_asymmetry_is_none() -> None:
+def test_a_spike_is_an_outlier_and_asymmetry_is_none():
     scan = tailed_raster(seed=3, side=33)
     u = scan.u_zz.copy()
     spikes = (16, 18), (5, 25), (20, 12)
@@ -103,7 +103,7 @@ def test_a_spike_is_an_outlier_and_asymmetry_is_none() -> None:
     assert {tuple(map(int, place)) for place in np.argwhere(weight < 0.5)} == set(spikes)
 
 
-def test_a_round_sensor_keeps_its_profile_and_its_centre() -> None:
+def test_a_round_sensor_keeps_its_profile_and_its_centre():
     scan = simulated(raster=True, points=33, half_range=6e-3, noise=0.005, seed=4)
     round_ = estimated(scan)
     any_ = estimated(scan, angular=True)

@@ -15,7 +15,7 @@ def band_of(estimate: ProfileEstimate) -> Band:
 
 
 @pytest.mark.parametrize("options", [{}, {"repeats": 2, "points": 33}, {"state_noise": False}])
-def test_the_noise_of_a_component_is_what_many_scans_scatter(options) -> None:
+def test_the_noise_of_a_component_is_what_many_scans_scatter(options):
     estimate = estimated(simulated(noise=0.01, **options))
     smoothed = smooth_profile(estimate)
     draws = np.random.default_rng().normal(0.0, estimate.noise, (4000, estimate.points.u.size))
@@ -26,7 +26,7 @@ def test_the_noise_of_a_component_is_what_many_scans_scatter(options) -> None:
     np.testing.assert_allclose(scatter[counted], noise[counted], rtol=0.06)
 
 
-def test_less_noise_resolves_more_and_the_relevant_band_lies_within_the_resolved() -> None:
+def test_less_noise_resolves_more_and_the_relevant_band_lies_within_the_resolved():
     bands = [band_of(estimated(simulated(noise=noise))) for noise in (0.02, 0.005, 0.001)]
     resolved = [band.resolved for band in bands]
     assert resolved == sorted(resolved)
@@ -41,7 +41,7 @@ def test_less_noise_resolves_more_and_the_relevant_band_lies_within_the_resolved
 )
 def test_within_the_band_the_transfer_function_is_known_to_a_third_and_beyond_it_is_not(
     kernel, noise
-) -> None:
+):
     places = np.array([0.8, 1.5])
     errors = []
     for seed in range(8):
@@ -57,7 +57,7 @@ def test_within_the_band_the_transfer_function_is_known_to_a_third_and_beyond_it
     assert beyond > 1 / 3
 
 
-def test_the_uncertainty_of_the_transfer_function_is_that_of_draws_of_the_posterior() -> None:
+def test_the_uncertainty_of_the_transfer_function_is_that_of_draws_of_the_posterior():
     estimate = estimated(simulated(noise=0.005))
     basis = estimate.basis
     k = estimate.model.k

@@ -17,14 +17,14 @@ R = np.linspace(0.0, 3e-3, 121)
 NODES = Wavenumbers.covering(60e3, 12e-3)
 
 
-def test_the_prior_weights_add_up_and_the_uncertainty_allows_no_gaussian() -> None:
+def test_the_prior_weights_add_up_and_the_uncertainty_allows_no_gaussian():
     assert sum(h.estimate for h in HYPOTHESES) == pytest.approx(1.0)
     assert sum(h.uncertainty for h in HYPOTHESES) == pytest.approx(1.0)
     assert HYPOTHESES[0].shape is None
     assert HYPOTHESES[0].uncertainty == 0.0
 
 
-def test_posterior_odds_are_prior_odds_times_the_ratio_of_marginal_likelihoods() -> None:
+def test_posterior_odds_are_prior_odds_times_the_ratio_of_marginal_likelihoods():
     """Densities of the data, flat priors in ln A, ln(width) and the nuisance parameters."""
     scan = simulated(noise=0.01, kernel=TAILS, repeats=2)
     # Stated larger than it is, so that it is the noise of every hypothesis.
@@ -70,7 +70,7 @@ def test_posterior_odds_are_prior_odds_times_the_ratio_of_marginal_likelihoods()
     np.testing.assert_allclose(found - found.max(), logs - np.max(logs), atol=1e-6)
 
 
-def test_the_width_reached_by_fewer_points_than_components_keeps_the_prior() -> None:
+def test_the_width_reached_by_fewer_points_than_components_keeps_the_prior():
     """Few places cannot tell 79 coefficients; what they do not tell stays uncertain."""
     scan = simulated(points=15, half_range=5e-3, noise=0.003)
     assert np.isfinite(estimated(scan).weighed.covariance).all()
@@ -80,7 +80,7 @@ def test_the_width_reached_by_fewer_points_than_components_keeps_the_prior() -> 
 
 
 @pytest.mark.parametrize("monotone", [False, True])
-def test_a_constrained_profile_meets_its_constraint_and_moves_little(monotone) -> None:
+def test_a_constrained_profile_meets_its_constraint_and_moves_little(monotone):
     moved = []
     for seed in range(6):
         estimate = estimated(simulated(noise=0.003, repeats=2, seed=seed, kernel=TAILS))
@@ -95,7 +95,7 @@ def test_a_constrained_profile_meets_its_constraint_and_moves_little(monotone) -
 
 
 @pytest.mark.parametrize("shape", SHAPES, ids=lambda s: f"{s.name} {s.blur} {s.extent}")
-def test_a_shape_is_its_transform_and_a_strength_of_one_as_large_as_the_gaussian(shape) -> None:
+def test_a_shape_is_its_transform_and_a_strength_of_one_as_large_as_the_gaussian(shape):
     rings = shape.rings(SIGMA, CONVERSION)
     r = np.linspace(0.0, 4e-3, 41)
     transform = rings.transform(NODES.k)

@@ -31,7 +31,7 @@ def elliptic_scan(e: tuple[float, float], seed: int) -> Scan:
     return replace(scan, u_zz_errors=np.full(scan.u_zz.shape, scan.synthetic["noise"]))
 
 
-def test_the_harmonics_are_the_convolution_with_an_elliptic_gaussian() -> None:
+def test_the_harmonics_are_the_convolution_with_an_elliptic_gaussian():
     e = (0.3, 0.2)
     expected = clean_raster(ellipse(e), **LAYOUT).ravel()
     estimate = estimated(elliptic_scan(e, 0))
@@ -40,7 +40,7 @@ def test_the_harmonics_are_the_convolution_with_an_elliptic_gaussian() -> None:
     np.testing.assert_allclose(found, expected, atol=2e-6 * expected.max())
 
 
-def test_the_departure_from_the_round_gaussian_is_the_ellipse_less_it() -> None:
+def test_the_departure_from_the_round_gaussian_is_the_ellipse_less_it():
     x = np.linspace(-2e-3, 2e-3, 9)
     y = 0.7 * x
     round_ = unit_gaussian(np.hypot.outer(y, x), SIGMA)
@@ -49,7 +49,7 @@ def test_the_departure_from_the_round_gaussian_is_the_ellipse_less_it() -> None:
     np.testing.assert_allclose(found, expected, atol=1e-12 * round_.max())
 
 
-def test_the_columns_are_the_derivatives_of_the_response() -> None:
+def test_the_columns_are_the_derivatives_of_the_response():
     estimate = estimated(simulated(raster=True, points=9))
     geometry = estimate.model.geometry(estimate.centres)
     here = np.array([0.2, -0.1])
@@ -70,7 +70,7 @@ def test_the_columns_are_the_derivatives_of_the_response() -> None:
         np.testing.assert_allclose(shift[i], slope, atol=1e-4 * np.abs(slope).max())
 
 
-def test_an_ellipse_is_found_with_an_uncertainty_that_is_true() -> None:
+def test_an_ellipse_is_found_with_an_uncertainty_that_is_true():
     truth = (0.25, -0.15)
     rows = []
     for seed in range(SEEDS):

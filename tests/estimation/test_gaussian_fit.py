@@ -35,7 +35,7 @@ def fit(scan: Scan):
     baseline=st.floats(-0.5, 0.5),
     drift=st.floats(-0.3, 0.3),
 )
-def test_without_noise_every_parameter_is_recovered(sigma, centre, baseline, drift) -> None:
+def test_without_noise_every_parameter_is_recovered(sigma, centre, baseline, drift):
     scan = simulated(
         kernel=memscal.GaussianMixture((1.0,), (sigma,)),
         centre=(centre, 0.0),
@@ -52,14 +52,14 @@ def test_without_noise_every_parameter_is_recovered(sigma, centre, baseline, dri
     assert 2 * found.drift[1] == pytest.approx(scan.synthetic["drift"], abs=1e-9)
 
 
-def test_uneven_and_unsorted_positions_change_nothing() -> None:
+def test_uneven_and_unsorted_positions_change_nothing():
     even = simulated(noise=0.0, points=129)
     chosen = np.random.default_rng().permutation(129)[:60]
     uneven = replace(even, x=even.x[chosen], u_zz=even.u_zz[chosen])
     assert fit(uneven).sigma == pytest.approx(fit(even).sigma, rel=1e-5)
 
 
-def test_the_jacobian_is_the_derivative_of_the_prediction() -> None:
+def test_the_jacobian_is_the_derivative_of_the_prediction():
     for raster in (False, True):
         model = forward(simulated(raster=raster, points=13, noise=0.0))
         found = fit_gaussian_to_points(model, np.ones_like(model.points.u))
@@ -85,14 +85,14 @@ def test_the_jacobian_is_the_derivative_of_the_prediction() -> None:
 
 
 @pytest.mark.parametrize("place", [0, 11, 31, 64])
-def test_one_gross_outlier_does_not_lead_the_search_astray(place: int) -> None:
+def test_one_gross_outlier_does_not_lead_the_search_astray(place):
     scan = simulated(noise=0.002)
     u = scan.u_zz.copy()
     u[place] += 3 * u.max()
     assert fit(replace(scan, u_zz=u)).centre[0, 0] == pytest.approx(0.14e-3, abs=0.05e-3)
 
 
-def test_a_voltage_that_never_falls_again_is_refused() -> None:
+def test_a_voltage_that_never_falls_again_is_refused():
     scan = simulated()
     bowl = 1e-4 * (scan.x / 1e-3) ** 2
     with pytest.raises(FitError, match="apparatus function"):

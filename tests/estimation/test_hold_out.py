@@ -12,7 +12,7 @@ from memscal.estimation.model_tests import hold_out, load_groups
 from memscal.estimation.residuals import free_model
 
 
-def test_the_fall_of_the_residual_sum_is_the_distance_in_the_predictive_covariance() -> None:
+def test_the_fall_of_the_residual_sum_is_the_distance_in_the_predictive_covariance():
     estimate = estimated(simulated(repeats=2, points=33))
     model = free_model(estimate, clip_outliers=True)
     group = estimate.points.repeat
@@ -39,7 +39,7 @@ def test_the_fall_of_the_residual_sum_is_the_distance_in_the_predictive_covarian
     {"load": [0.5, 1.0, 1.5], "points": 33},
     {"repeats": 14, "points": 21},
 ])  # fmt: skip
-def test_groups_of_good_scans_are_rejected_no_more_often_than_is_said(options) -> None:
+def test_groups_of_good_scans_are_rejected_no_more_often_than_is_said(options):
     scans = 60 if FULL else 12
     level = 0.1
     p_values = []
@@ -55,7 +55,7 @@ def test_groups_of_good_scans_are_rejected_no_more_often_than_is_said(options) -
 
 @pytest.mark.parametrize("gain", [1.04, 0.92])
 @pytest.mark.parametrize("stated", [True, False])
-def test_a_repeat_of_another_gain_is_found_and_named(gain: float, stated: bool) -> None:
+def test_a_repeat_of_another_gain_is_found_and_named(gain, stated):
     scan = simulated(repeats=4, noise=0.003, state_noise=stated)
     u = scan.u_zz.copy()
     u[2] *= gain
@@ -65,7 +65,7 @@ def test_a_repeat_of_another_gain_is_found_and_named(gain: float, stated: bool) 
     assert found.p_value < 1e-3
 
 
-def test_a_repeat_may_have_its_own_baseline_and_centre() -> None:
+def test_a_repeat_may_have_its_own_baseline_and_centre():
     scan = simulated(repeats=3, noise=0.003)
     largest = scan.u_zz.max()
     u = scan.u_zz.copy()
@@ -79,13 +79,13 @@ def test_a_repeat_may_have_its_own_baseline_and_centre() -> None:
     assert all(found.p_value > 1e-6 for found in outcomes)
 
 
-def test_a_signal_that_is_not_linear_in_load_is_found_by_the_load_held_out() -> None:
+def test_a_signal_that_is_not_linear_in_load_is_found_by_the_load_held_out():
     scan = simulated(load=[0.5, 1.0, 1.5], noise=0.003, baseline=0.0, drift=0.0)
     estimate = estimated(replace(scan, u_zz=scan.u_zz * (1 + 0.06 * (scan.normal_load - 1.0))))
     assert hold_out(estimate, load_groups(estimate.points.load)).p_value < 1e-3
 
 
-def test_one_outlier_does_not_condemn_its_repeat() -> None:
+def test_one_outlier_does_not_condemn_its_repeat():
     scan = simulated(repeats=3)
     u = scan.u_zz.copy()
     u[1, 30] += 0.5 * u.max()
@@ -93,7 +93,7 @@ def test_one_outlier_does_not_condemn_its_repeat() -> None:
     assert hold_out(estimate, estimate.points.repeat).p_value > 1e-3
 
 
-def test_more_groups_than_ten_are_held_out_several_at_a_time_and_one_alone_not_at_all() -> None:
+def test_more_groups_than_ten_are_held_out_several_at_a_time_and_one_alone_not_at_all():
     estimate = estimated(simulated(repeats=23, points=17))
     found = hold_out(estimate, estimate.points.repeat)
     assert found.folds == 10

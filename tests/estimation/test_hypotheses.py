@@ -30,7 +30,7 @@ BOTH = {"repeats": 2, "points": 33, "branch": ["approach", "retreat"]}
         (hysteresis_test, BOTH | {"state_noise": False}),
     ],
 )
-def test_a_true_hypothesis_is_rejected_as_rarely_as_chance_demands(test, options) -> None:
+def test_a_true_hypothesis_is_rejected_as_rarely_as_chance_demands(test, options):
     scans = 80 if FULL else 16
     extra = [test(estimated(simulated(seed=seed, **options))) for seed in range(scans)]
     chances = [
@@ -43,7 +43,7 @@ def test_a_true_hypothesis_is_rejected_as_rarely_as_chance_demands(test, options
     assert low <= rejected <= high
 
 
-def test_a_tilted_rod_is_found() -> None:
+def test_a_tilted_rod_is_found():
     scan = simulated(noise=0.002)
     side = scan.x - 0.14e-3
     bump = 0.05 * scan.u_zz.max() * (side / 1e-3) * np.exp(-((side / 1.2e-3) ** 2))
@@ -51,7 +51,7 @@ def test_a_tilted_rod_is_found() -> None:
     assert odd.fall > chi_square_limit(odd.count)
 
 
-def test_linearity_and_hysteresis_are_tested_only_where_loads_and_branches_differ() -> None:
+def test_linearity_and_hysteresis_are_tested_only_where_loads_and_branches_differ():
     assert linearity_test(estimated(simulated())) is None
     for branch in (["approach", ""], ["retreat", "retreat"]):
         assert hysteresis_test(estimated(simulated(**BOTH | {"branch": branch}))) is None
@@ -76,7 +76,7 @@ def hysteretic(seed: int, conversion: float = 0.0, play: float = 0.0, step: floa
 
 
 @pytest.mark.parametrize("differences", [(0.02, 0.0, 0.0), (0.0, -20e-6, 0.0), (0.0, 0.0, 1e-4)])
-def test_a_hysteresis_is_found_and_measured_within_its_uncertainty(differences) -> None:
+def test_a_hysteresis_is_found_and_measured_within_its_uncertainty(differences):
     scans = 40 if FULL else 8
     extra = [hysteresis_test(estimated(hysteretic(seed, *differences))) for seed in range(scans)]
     assert all(columns.outcome.value > columns.outcome.limit for columns in extra)
@@ -142,7 +142,7 @@ CREEP = {"creep": 0.05, "lag": 0.5e-3}
         ({"louder": 4.0, "named": False, "stated": False}, "noise_agreement", None),
     ],
 )
-def test_what_differs_between_passes_fails_its_check_and_no_other(given, failed, centre) -> None:
+def test_what_differs_between_passes_fails_its_check_and_no_other(given, failed, centre):
     found = memscal.calibrate(passes(1, **given), centre=centre, method="bayesian", other=False)
     checks = {check.name: check for check in found.apparatus.checks}
     names = {"hysteresis", "offset_agreement", "noise_agreement"}
@@ -160,7 +160,7 @@ def test_what_differs_between_passes_fails_its_check_and_no_other(given, failed,
 
 
 @pytest.mark.parametrize("eta", [-0.05, 0.1])
-def test_a_gain_that_changes_with_load_is_measured(eta: float) -> None:
+def test_a_gain_that_changes_with_load_is_measured(eta):
     scan = simulated(load=[0.5, 1.0, 1.5], noise=0.002, baseline=0.0, drift=0.0)
     bent = scan.u_zz * (1 + eta * (scan.normal_load - 1.0))
     linear = linearity_test(estimated(replace(scan, u_zz=bent)))
@@ -169,7 +169,7 @@ def test_a_gain_that_changes_with_load_is_measured(eta: float) -> None:
     assert linear.coefficients[0] == pytest.approx(eta, abs=5 * linear.errors[0] + 0.3 * abs(eta))
 
 
-def test_a_round_sensor_passes_and_an_elliptic_one_is_found() -> None:
+def test_a_round_sensor_passes_and_an_elliptic_one_is_found():
     scan = simulated(raster=True, points=17, noise=0.003)
     even = axisymmetry_test(estimated(scan))
     assert even.fall < chi2.isf(1e-6, even.count)

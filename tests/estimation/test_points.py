@@ -10,7 +10,7 @@ from memscal.errors import InputError
 from memscal.estimation.points import measured_points, scans_by_load
 
 
-def test_missing_voltages_and_loads_are_left_out_and_counted() -> None:
+def test_missing_voltages_and_loads_are_left_out_and_counted():
     scan = simulated(load=[0.5, 1.0], points=21)
     u = scan.u_zz.copy()
     load = np.array(scan.normal_load)
@@ -23,7 +23,7 @@ def test_missing_voltages_and_loads_are_left_out_and_counted() -> None:
     assert np.isfinite(points.load).all()
 
 
-def test_repeats_at_loads_of_their_own_become_scans_and_keep_their_readings() -> None:
+def test_repeats_at_loads_of_their_own_become_scans_and_keep_their_readings():
     one = simulated(load=1.0, repeats=2, points=11)
     several = replace(simulated(load=[1.0, 0.3, 1.01], points=11), load_uncertainty=0.01)
     split, owners = scans_by_load([one, several])
@@ -45,13 +45,13 @@ def test_repeats_at_loads_of_their_own_become_scans_and_keep_their_readings() ->
         (lambda s: {"normal_load": np.zeros_like(s.u_zz)}, "above zero"),
     ],
 )
-def test_a_scan_that_cannot_be_calibrated_is_refused_with_its_reason(change, words) -> None:
+def test_a_scan_that_cannot_be_calibrated_is_refused_with_its_reason(change, words):
     scan = simulated()
     with pytest.raises(InputError, match=words):
         measured_points(replace(scan, **change(scan)))
 
 
-def test_a_negative_outlier_is_no_wrong_sign() -> None:
+def test_a_negative_outlier_is_no_wrong_sign():
     scan = simulated()
     u = scan.u_zz.copy()
     u[5] -= 10 * u.max()
@@ -60,7 +60,7 @@ def test_a_negative_outlier_is_no_wrong_sign() -> None:
 
 @pytest.mark.parametrize("correlation", [0.0, 0.4])
 @pytest.mark.parametrize("anew", [False, True])
-def test_repeats_share_the_error_of_their_position(anew: bool, correlation: float) -> None:
+def test_repeats_share_the_error_of_their_position(anew, correlation):
     scan = simulated(repeats=3, points=9)
     apart = np.abs(np.subtract.outer(np.arange(9), np.arange(9)))
     scan = replace(

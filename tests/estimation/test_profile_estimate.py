@@ -14,7 +14,7 @@ from memscal.estimation.bayesian import HYPOTHESES, weigh_departures
 from memscal.estimation.departures import ReducedScan
 
 
-def test_the_noise_is_found_from_the_scatter_alone() -> None:
+def test_the_noise_is_found_from_the_scatter_alone():
     # Scans of about 60 degrees of freedom each: the pooled variance follows chi-square.
     degrees = 60
     seeds = range(40 if FULL else 20)
@@ -28,7 +28,7 @@ def test_the_noise_is_found_from_the_scatter_alone() -> None:
     assert low - 0.06 < pooled < high
 
 
-def test_stated_noise_that_is_too_small_is_raised_and_never_lowered() -> None:
+def test_stated_noise_that_is_too_small_is_raised_and_never_lowered():
     scan = simulated(noise=0.01)
     small = replace(scan, u_zz_errors=scan.u_zz_errors / 3)
     large = replace(scan, u_zz_errors=scan.u_zz_errors * 3)
@@ -37,7 +37,7 @@ def test_stated_noise_that_is_too_small_is_raised_and_never_lowered() -> None:
 
 
 @pytest.mark.parametrize("height", [-1.0, 0.3, 5.0])
-def test_an_outlier_is_found_weighed_down_and_moves_nothing(height: float) -> None:
+def test_an_outlier_is_found_weighed_down_and_moves_nothing(height):
     scan = simulated(noise=0.002)
     clean = estimated(scan)
     u = scan.u_zz.copy()
@@ -51,7 +51,7 @@ def test_an_outlier_is_found_weighed_down_and_moves_nothing(height: float) -> No
     )
 
 
-def test_gross_outliers_leave_the_noise_as_it_is() -> None:
+def test_gross_outliers_leave_the_noise_as_it_is():
     ratios = []
     for seed in range(24 if FULL else 12):
         scan = simulated(noise=0.005, seed=seed)
@@ -66,12 +66,12 @@ def test_gross_outliers_leave_the_noise_as_it_is() -> None:
     assert np.mean(ratios) == pytest.approx(1.0, abs=0.02)
 
 
-def test_a_scan_beside_the_sensor_is_refused() -> None:
+def test_a_scan_beside_the_sensor_is_refused():
     with pytest.raises(FitError, match="outside the scan"):
         estimated(simulated(centre=(8.4e-3, 0.0)))
 
 
-def test_the_gain_is_the_derivative_of_the_estimate_by_the_voltages() -> None:
+def test_the_gain_is_the_derivative_of_the_estimate_by_the_voltages():
     scan = simulated(kernel=RING, noise=0.002, state_noise=False)
     estimate = estimated(scan)
     change = np.zeros_like(scan.u_zz)
@@ -87,7 +87,7 @@ def test_the_gain_is_the_derivative_of_the_estimate_by_the_voltages() -> None:
     np.testing.assert_allclose(found, expected, atol=0.05 * np.abs(expected).max())
 
 
-def test_noise_that_is_stated_too_large_widens_the_band_by_what_noise_does_and_no_more() -> None:
+def test_noise_that_is_stated_too_large_widens_the_band_by_what_noise_does_and_no_more():
     """What the film hides does not grow with the noise: only its share of the band does."""
     # Nor does a straight baseline; of a curved one more noise leaves more open.
     scan = replace(simulated(noise=0.002), baseline_curvature_uncertainty=0.0)
@@ -97,7 +97,7 @@ def test_noise_that_is_stated_too_large_widens_the_band_by_what_noise_does_and_n
     assert bands[0] < bands[1] < 3 * bands[0]
 
 
-def test_stated_noise_is_the_least_that_the_evidence_takes() -> None:
+def test_stated_noise_is_the_least_that_the_evidence_takes():
     """Overstated, it says nothing against a Gaussian; understated, the scatter counts."""
     for seed in range(4):
         scan = simulated(noise=0.01, kernel=TAILS, seed=seed)
@@ -108,7 +108,7 @@ def test_stated_noise_is_the_least_that_the_evidence_takes() -> None:
         assert stated < over == pytest.approx(HYPOTHESES[0].estimate, abs=0.01)
 
 
-def test_a_scan_without_scatter_is_calibrated_at_the_noise_that_it_states() -> None:
+def test_a_scan_without_scatter_is_calibrated_at_the_noise_that_it_states():
     clean = simulated(noise=0.0)
     apparatus = memscal.calibrate(replace(clean, u_zz_errors=np.full(65, 1e-5))).apparatus
     assert apparatus.conversion_constant == pytest.approx(CONVERSION, rel=1e-3)

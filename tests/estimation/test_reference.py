@@ -2,7 +2,6 @@
 
 import re
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -21,7 +20,7 @@ POINTS = measured_points(SCAN)
 CONTACT = memscal.indent(SCAN.film, SCAN.indenter, load=1.0)
 
 
-def test_the_order_of_preference_is_given_then_carried_then_solved() -> None:
+def test_the_order_of_preference_is_given_then_carried_then_solved():
     other = CONTACT.profile()
     carrying = replace(SCAN, reference=other)
     assert reference_profile(carrying, CONTACT) is CONTACT
@@ -31,7 +30,7 @@ def test_the_order_of_preference_is_given_then_carried_then_solved() -> None:
     assert solved.load == SCAN.load
 
 
-def test_a_table_that_does_not_reach_the_axis_is_refused() -> None:
+def test_a_table_that_does_not_reach_the_axis_is_refused():
     full = CONTACT.profile()
     kept = full.r > 2e-3
     part = replace(full, r=full.r[kept], sigma_zz=full.sigma_zz[kept], sigma_rz=None)
@@ -39,7 +38,7 @@ def test_a_table_that_does_not_reach_the_axis_is_refused() -> None:
         reference_spectrum(part, POINTS)
 
 
-def test_a_table_in_tension_is_refused_with_its_cure() -> None:
+def test_a_table_in_tension_is_refused_with_its_cure():
     full = CONTACT.profile()
     with pytest.raises(InputError, match="Change the sign"):
         reference_spectrum(replace(full, sigma_zz=-full.sigma_zz), POINTS)
@@ -86,7 +85,7 @@ LOADS = replace(SCAN, normal_load=np.geomspace(0.998, 1.001, SCAN.u_zz.size))
         ({}, {"film": None, "load": 1.01}, "load 1 N"),
     ],
 )
-def test_a_reference_agrees_with_its_scan_within_their_uncertainties(scan, table, words) -> None:
+def test_a_reference_agrees_with_its_scan_within_their_uncertainties(scan, table, words):
     made = []
     for whole, values in ((SCAN, dict(scan)), (TABLE, dict(table))):
         film = {name: values.pop(name) for name in [*values] if hasattr(FILM, name)}
@@ -103,7 +102,7 @@ def test_a_reference_agrees_with_its_scan_within_their_uncertainties(scan, table
     assert re.search(words, difference)
 
 
-def test_an_alternative_may_have_another_law_and_no_other_thickness() -> None:
+def test_an_alternative_may_have_another_law_and_no_other_thickness():
     scan = replace(SCAN, film=replace(FILM, law="linear"))
     film = replace(FILM, **RUBBER)
     other = replace(TABLE, film=film, friction_coefficient=np.inf)
@@ -112,7 +111,7 @@ def test_an_alternative_may_have_another_law_and_no_other_thickness() -> None:
         memscal.calibrate(scan, alternative=replace(other, film=replace(film, thickness=3e-3)))
 
 
-def test_a_reference_that_travels_in_the_scan_takes_its_film_and_agrees(tmp_path: Path) -> None:
+def test_a_reference_that_travels_in_the_scan_takes_its_film_and_agrees(tmp_path):
     scan = replace(SCAN, film=replace(FILM, **RUBBER), reference=replace(TABLE, film=None))
     memscal.write_scan(scan, tmp_path / "scan.h5")
     read = memscal.read_scan(tmp_path / "scan.h5")
@@ -121,7 +120,7 @@ def test_a_reference_that_travels_in_the_scan_takes_its_film_and_agrees(tmp_path
         memscal.calibrate(replace(scan, load=0.5))
 
 
-def test_sensitivities_are_the_change_of_the_solution_by_one_standard_uncertainty() -> None:
+def test_sensitivities_are_the_change_of_the_solution_by_one_standard_uncertainty():
     spectrum = reference_spectrum(CONTACT, POINTS)
     changes = film_sensitivities(SCAN.set_up, spectrum) | rod_sensitivities(SCAN.set_up, spectrum)
     assert set(changes) == {"young_modulus", "thickness", "poisson_ratio", "rod_radius"}

@@ -34,7 +34,7 @@ def made(values: np.ndarray, passes: int = 1) -> Residuals:
 @pytest.mark.parametrize(
     "options", [{}, {"repeats": 3, "points": 33}, {"raster": True, "points": 17}]
 )
-def test_residuals_keep_the_misfit_s_size_and_lose_one_for_each_column(options) -> None:
+def test_residuals_keep_the_misfit_s_size_and_lose_one_for_each_column(options):
     estimate = estimated(simulated(**options))
     model = free_model(estimate)
     residuals = residuals_of(estimate)
@@ -43,7 +43,7 @@ def test_residuals_keep_the_misfit_s_size_and_lose_one_for_each_column(options) 
     assert residuals.degrees == model.data.size - model.design.shape[1]
 
 
-def test_an_outlier_is_left_out_of_the_residuals() -> None:
+def test_an_outlier_is_left_out_of_the_residuals():
     scan = simulated(noise=0.005)
     u = scan.u_zz.copy()
     u[20] += 0.5 * u.max()
@@ -52,7 +52,7 @@ def test_an_outlier_is_left_out_of_the_residuals() -> None:
     assert chi_square_test(residuals).p_value > 1e-6
 
 
-def test_each_row_and_each_repeat_is_a_pass_of_its_own_in_the_order_of_the_scan() -> None:
+def test_each_row_and_each_repeat_is_a_pass_of_its_own_in_the_order_of_the_scan():
     assert set(residuals_of(estimated(simulated(repeats=3, points=33))).sequence) == {0, 1, 2}
     estimate = estimated(simulated(raster=True, points=17))
     raster = residuals_of(estimate)
@@ -61,14 +61,14 @@ def test_each_row_and_each_repeat_is_a_pass_of_its_own_in_the_order_of_the_scan(
     assert (np.diff(estimate.points.x[raster.point])[np.diff(raster.sequence) == 0] > 0).all()
 
 
-def test_the_chi_square_is_that_of_the_distribution() -> None:
+def test_the_chi_square_is_that_of_the_distribution():
     found = chi_square_test(made(np.array([1.0, -2.0, 0.5, 1.5])))
     assert found.value == pytest.approx(7.5 / 4)
     assert found.p_value == pytest.approx(chi2.sf(7.5, 4))
     assert found.limit == pytest.approx(chi2.isf(1e-3, 4) / 4)
 
 
-def test_the_largest_step_is_that_of_a_mean_over_its_deviation() -> None:
+def test_the_largest_step_is_that_of_a_mean_over_its_deviation():
     values = np.append(np.zeros(12), np.ones(4))
     found = steps_test(made(values))
     assert found.value == pytest.approx(2.0)
@@ -79,13 +79,13 @@ def test_the_largest_step_is_that_of_a_mean_over_its_deviation() -> None:
     assert (unstated.value > unstated.limit) == (unstated.p_value < 1e-3)
 
 
-def test_neighbours_of_different_passes_are_no_neighbours() -> None:
+def test_neighbours_of_different_passes_are_no_neighbours():
     values = np.tile([1.0, 1.0, -1.0, -1.0], 5)
     assert steps_test(made(values, passes=10)).value == pytest.approx(np.sqrt(2))
     assert neighbour_correlation_test(made(values, passes=20)).value == 0.0
 
 
-def test_the_neighbours_correlation_does_not_depend_on_the_noise_s_size() -> None:
+def test_the_neighbours_correlation_does_not_depend_on_the_noise_s_size():
     values = np.random.default_rng().normal(size=50)
     one, other = (neighbour_correlation_test(made(values * size)) for size in (1.0, 1e-6))
     assert one.limit == other.limit
@@ -98,7 +98,7 @@ def pure_error(scan: Scan) -> TestOutcome | None:
 
 
 @pytest.mark.parametrize("scatter", [0.0, 5e-6])
-def test_repeats_take_the_place_of_stated_noise(scatter: float) -> None:
+def test_repeats_take_the_place_of_stated_noise(scatter):
     """Where the stage comes to rest elsewhere each time, as well."""
     scans = 150 if FULL else 25
     level = 0.1
@@ -117,7 +117,7 @@ def test_repeats_take_the_place_of_stated_noise(scatter: float) -> None:
     assert pure_error(simulated(state_noise=False)) is None
 
 
-def test_the_pure_error_is_the_scatter_of_repeats() -> None:
+def test_the_pure_error_is_the_scatter_of_repeats():
     scan = simulated(repeats=3, points=33, state_noise=False)
     estimate = estimated(scan)
     model = free_model(estimate)
@@ -132,7 +132,7 @@ def test_the_pure_error_is_the_scatter_of_repeats() -> None:
 
 
 @pytest.mark.parametrize("cause", ["a bent baseline", "a step of the baseline", "correlated noise"])
-def test_faults_leave_steps_and_alike_neighbours(cause: str) -> None:
+def test_faults_leave_steps_and_alike_neighbours(cause):
     scan = simulated(noise=0.003, points=97)
     largest = scan.u_zz.max()
     place = scan.x / scan.x.max()
@@ -153,7 +153,7 @@ def test_faults_leave_steps_and_alike_neighbours(cause: str) -> None:
     assert max(outcome.p_value for outcome in found) < 1e-3
 
 
-def test_a_wave_over_the_plane_is_told_from_noise_by_its_ring() -> None:
+def test_a_wave_over_the_plane_is_told_from_noise_by_its_ring():
     rng = np.random.default_rng()
     rows, columns = (each.ravel() for each in np.indices((40, 48)))
     noise = np.full(rows.size, 2.0)

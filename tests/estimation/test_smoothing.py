@@ -16,7 +16,7 @@ from memscal.estimation.smoothing import smooth_profile
 DISC = memscal.SmoothedDisc(radius=0.8e-3, sigma=0.3e-3)
 
 
-def test_the_division_is_linear_in_the_voltages() -> None:
+def test_the_division_is_linear_in_the_voltages():
     smoothed = smooth_profile(estimated(simulated(noise=0.005)))
     estimate = smoothed.estimate
     signal = smoothed.signal
@@ -37,7 +37,7 @@ def test_the_division_is_linear_in_the_voltages() -> None:
 
 
 @pytest.mark.parametrize("width", [0.5e-3, 0.7e-3])
-def test_a_ring_in_the_voltages_is_followed_by_the_division(width: float) -> None:
+def test_a_ring_in_the_voltages_is_followed_by_the_division(width):
     scan = simulated(noise=0.001)
     followed = {}
     for method in ("white-noise", "bayesian"):
@@ -54,7 +54,7 @@ def test_a_ring_in_the_voltages_is_followed_by_the_division(width: float) -> Non
 
 
 @pytest.mark.parametrize("kernel", [memscal.GaussianMixture(), DISC, RING, TAILS])
-def test_a_scan_without_noise_is_its_own_profile(kernel: memscal.RadialKernel) -> None:
+def test_a_scan_without_noise_is_its_own_profile(kernel):
     smoothed = smooth_profile(estimated(simulated(noise=0.0, kernel=kernel)))
     np.testing.assert_allclose(
         smoothed.predicted, smoothed.signal, atol=1e-5 * smoothed.signal.max()
@@ -67,7 +67,7 @@ def test_a_scan_without_noise_is_its_own_profile(kernel: memscal.RadialKernel) -
     np.testing.assert_allclose(profile * reference[0] / profile[0], reference, rtol=0.05)
 
 
-def test_repeats_and_both_sides_count_by_their_weights() -> None:
+def test_repeats_and_both_sides_count_by_their_weights():
     scan = simulated(noise=0.005, centre=(0.0, 0.0))
     mirrored = np.stack([scan.u_zz, scan.u_zz[::-1]])
     errors = np.stack([scan.u_zz_errors] * 2)

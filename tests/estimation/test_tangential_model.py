@@ -47,7 +47,7 @@ def model_at(x: FloatArray, y: FloatArray, channel: str = "xz") -> ForwardModel:
 
 
 @pytest.mark.parametrize("channel", ["xz", "yz"])
-def test_the_signal_is_the_plain_sum_of_traction_times_sensitivity_over_the_sensor(channel) -> None:
+def test_the_signal_is_the_plain_sum_of_traction_times_sensitivity_over_the_sensor(channel):
     # The film's traction on every element of the base, weighed by G: in Cartesian coordinates,
     # with the indenter at (x, y) and the sensor at the centre.
     contact = memscal.indent(LINEAR_FILM, PAPER_ROD, load=2.0)
@@ -72,7 +72,7 @@ def test_the_signal_is_the_plain_sum_of_traction_times_sensitivity_over_the_sens
     np.testing.assert_allclose(found, expected, atol=2e-4 * np.abs(contact.base_shear(1e-3)))
 
 
-def test_derivatives_by_centre_and_distance_are_those_of_the_signal() -> None:
+def test_derivatives_by_centre_and_distance_are_those_of_the_signal():
     rng = np.random.default_rng()
     # One point exactly at the centre, where a shear changes fastest.
     centre = np.array([[0.2e-3, -0.1e-3]])
@@ -107,7 +107,7 @@ def test_derivatives_by_centre_and_distance_are_those_of_the_signal() -> None:
     np.testing.assert_allclose(slope, (wide - narrow) / 2e-4, atol=1e-5 * np.abs(slope).max())
 
 
-def test_a_reference_whose_shear_has_the_other_sign_is_refused() -> None:
+def test_a_reference_whose_shear_has_the_other_sign_is_refused():
     scan = shear_scan(seed=1)
     profile = memscal.indent(scan.film, scan.indenter, load=1.0, strain="linear").profile()
     points = [measured_points(scan, "xz")]

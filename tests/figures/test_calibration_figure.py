@@ -232,7 +232,7 @@ def sheared() -> ApparatusData:
     return memscal.calibrate(shear_scan(seed=1), channel="xz", method="evidence").apparatus
 
 
-def test_the_reference_is_the_shear_with_its_sides(sheared: ApparatusData):
+def test_the_reference_is_the_shear_with_its_sides(sheared):
     x, y = line(panels(calibration_figure(sheared))["scan"], "reference")
     scan = sheared.reconvolution
     # The scan is the reference, blurred: they rise and fall together.

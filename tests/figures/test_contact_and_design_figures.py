@@ -48,7 +48,7 @@ def planned() -> Design:
     return memscal.design(step=0.5e-3, repeats=2)
 
 
-def test_curves_are_the_designs_own(planned: Design):
+def test_curves_are_the_designs_own(planned):
     radial, transfer, varied = design_figure(planned, vary="repeats").axes
     (g,) = (line for line in radial.lines if line.get_label() == "G expected")
     shown = planned.r <= g.get_xdata()[-1] * 1e-3
@@ -63,6 +63,6 @@ def test_curves_are_the_designs_own(planned: Design):
     )
 
 
-def test_what_cannot_be_varied_is_refused(planned: Design):
+def test_what_cannot_be_varied_is_refused(planned):
     with pytest.raises(InputError, match="'weather'"):
         design_figure(planned, vary="weather")

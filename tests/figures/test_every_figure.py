@@ -95,7 +95,7 @@ def words(figure: Figure) -> list[Text]:
     return [text for text in texts if text.get_visible() and text.get_text().strip()]
 
 
-def test_uncertainties_have_one_coverage_factor_which_is_stated(figure: Figure):
+def test_uncertainties_have_one_coverage_factor_which_is_stated(figure):
     said = " ".join(text.get_text() for text in words(figure))
     expected = 0 if figure.get_label() in WITHOUT_UNCERTAINTIES else 1
     assert min(said.count("k = 2"), 1) == expected
@@ -105,7 +105,7 @@ def test_uncertainties_have_one_coverage_factor_which_is_stated(figure: Figure):
     assert set(re.findall(r"±(\S*)u\b", said)) <= {"2"}
 
 
-def test_no_text_lies_on_another_or_leaves_the_page(figure: Figure):
+def test_no_text_lies_on_another_or_leaves_the_page(figure):
     renderer = figure.canvas.get_renderer()
     boxes = [(each, each.get_window_extent(renderer)) for each in words(figure)]
     page = figure.bbox.padded(1)
@@ -125,7 +125,7 @@ def test_no_text_lies_on_another_or_leaves_the_page(figure: Figure):
 WITHOUT_UNIT = r"\$u\$|^sensors|in the batch|mu_e\$|ln[ (\\]"
 
 
-def test_the_label_of_an_axis_has_a_unit(figure: Figure):
+def test_the_label_of_an_axis_has_a_unit(figure):
     labels = [text for each in figure.axes for text in (each.get_xlabel(), each.get_ylabel())]
     assert any(labels)
     for label in filter(None, labels):

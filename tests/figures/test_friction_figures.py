@@ -35,7 +35,7 @@ def bars(axes: Axes) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
     return drawn
 
 
-def test_profiles_are_drawn_with_their_expanded_uncertainties(found: FrictionComparison):
+def test_profiles_are_drawn_with_their_expanded_uncertainties(found):
     figure = profile_figure(found, lubrication="lubricated")
     profiles = found.measured.profiles[len(LOADS) :]
     for (r, s, u), profile in zip(bars(figure.axes[0]), profiles, strict=True):
@@ -44,7 +44,7 @@ def test_profiles_are_drawn_with_their_expanded_uncertainties(found: FrictionCom
         np.testing.assert_allclose(u, 2e-3 * profile.s_zz_errors)
 
 
-def test_curves_are_of_the_fitted_coefficient_and_of_the_limits(found: FrictionComparison):
+def test_curves_are_of_the_fitted_coefficient_and_of_the_limits(found):
     axes = of_friction.comparison_figure(found).axes[0]
     best = found.joint["dry"]["incremental"].value
     for ls, friction in (("-", best), (":", 0.0), ("--", math.inf)):
@@ -59,7 +59,7 @@ def test_curves_are_of_the_fitted_coefficient_and_of_the_limits(found: FrictionC
             )
 
 
-def test_ratios_stand_at_their_loads_among_the_calculated_curves(found: FrictionComparison):
+def test_ratios_stand_at_their_loads_among_the_calculated_curves(found):
     figure = of_friction.maxima_figure(found)
     assert len(figure.axes) == len(found.loadings)
     for axes, loads in zip(figure.axes, found.loads.values(), strict=True):
@@ -86,7 +86,7 @@ def test_an_open_interval_is_an_arrow_to_infinity_without_a_value():
     assert not [line for line in axes.lines if line.get_label() == "_value"]
 
 
-def test_likelihoods_touch_zero_at_the_best_coefficient(found: FrictionComparison):
+def test_likelihoods_touch_zero_at_the_best_coefficient(found):
     axes = likelihood_figure(found).axes[0]
     curves = {line.get_label(): line for line in axes.lines}
     one = found.loads["incremental"][0]
@@ -105,7 +105,7 @@ def test_the_likelihood_of_a_slip_length_touches_zero_at_it():
     assert render_figure(figure, "png", dpi=50).startswith(b"\x89PNG")
 
 
-def test_what_was_not_measured_or_compared_is_refused_by_name(found: FrictionComparison):
+def test_what_was_not_measured_or_compared_is_refused_by_name(found):
     with pytest.raises(InputError, match="sideways"):
         profile_figure(found, loading="sideways")
     with pytest.raises(InputError, match="not stated"):

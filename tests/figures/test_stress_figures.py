@@ -25,7 +25,7 @@ def points(axes: Axes) -> np.ndarray:
     return together[np.lexsort(together.T)]
 
 
-def test_both_panels_show_every_point(stress: MeasuredStress):
+def test_both_panels_show_every_point(stress):
     rows = [np.column_stack([p.r * 1e3, p.s_zz * 1e-3]) for p in stress.profiles]
     wanted = np.concatenate(rows)
     wanted = wanted[np.lexsort(wanted.T)]
@@ -33,7 +33,7 @@ def test_both_panels_show_every_point(stress: MeasuredStress):
         np.testing.assert_allclose(points(axes), wanted)
 
 
-def test_the_bars_are_two_standard_uncertainties(stress: MeasuredStress):
+def test_the_bars_are_two_standard_uncertainties(stress):
     bars = measured_stress_figure(stress).axes[0].collections
     assert len(bars) == len(stress.profiles)
     for bar, profile in zip(bars, stress.profiles, strict=True):
@@ -50,7 +50,7 @@ def lines(axes) -> dict[str, object]:
     return {line.get_label(): line for line in axes.lines}
 
 
-def test_the_curves_are_those_of_the_restoration(restoration: Restoration):
+def test_the_curves_are_those_of_the_restoration(restoration):
     drawn = lines(restoration_figure(restoration).axes[0])
     by_word = {
         word: next(line for label, line in drawn.items() if word in label)
@@ -66,7 +66,7 @@ def test_the_curves_are_those_of_the_restoration(restoration: Restoration):
     np.testing.assert_allclose(by_word["scan"].get_ydata(), restoration.measured_stress * 1e-3)
 
 
-def test_the_band_is_two_standard_uncertainties(restoration: Restoration):
+def test_the_band_is_two_standard_uncertainties(restoration):
     (band,) = restoration_figure(restoration).axes[0].collections
     upper = band.get_paths()[0].vertices[:, 1].max()
     highest = restoration.sigma_zz + 2 * restoration.stress_uncertainty(restoration.r)

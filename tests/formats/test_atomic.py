@@ -54,9 +54,7 @@ def assert_untouched(target: Path) -> None:
 
 
 @pytest.mark.parametrize("hard_links", [True, False])
-def test_a_new_file_holds_the_bytes_and_nothing_else_is_left(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, hard_links
-):
+def test_a_new_file_holds_the_bytes_and_nothing_else_is_left(tmp_path, monkeypatch, hard_links):
     if not hard_links:
         monkeypatch.setattr(os, "link", fail_with(errno.EPERM))
     atomic_write_bytes(tmp_path / "new.bin", b"abc")
@@ -77,7 +75,7 @@ def test_a_new_file_holds_the_bytes_and_nothing_else_is_left(
     ids=["full disk", "read-only disk", "forbidden", "quota", "broken disk"],
 )
 def test_a_disk_that_refuses_leaves_the_old_output_and_says_what_to_do(
-    target: Path, monkeypatch: pytest.MonkeyPatch, call, code, cure
+    target, monkeypatch, call, code, cure
 ):
     with monkeypatch.context() as patch:
         patch.setattr(os, call, fail_with(code))
@@ -85,7 +83,7 @@ def test_a_disk_that_refuses_leaves_the_old_output_and_says_what_to_do(
     assert_untouched(target)
 
 
-def test_short_writes_are_continued(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_short_writes_are_continued(tmp_path, monkeypatch):
     write = os.write
     data = bytes(range(256)) * 10
     with monkeypatch.context() as patch:
@@ -94,7 +92,7 @@ def test_short_writes_are_continued(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     assert (tmp_path / "a").read_bytes() == data
 
 
-def test_an_interrupt_leaves_no_temporary_file(target: Path, monkeypatch: pytest.MonkeyPatch):
+def test_an_interrupt_leaves_no_temporary_file(target, monkeypatch):
     def interrupt(*arguments: Any) -> None:
         raise KeyboardInterrupt
 
@@ -105,7 +103,7 @@ def test_an_interrupt_leaves_no_temporary_file(target: Path, monkeypatch: pytest
     assert_untouched(target)
 
 
-def test_a_file_that_appears_late_is_not_replaced(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_a_file_that_appears_late_is_not_replaced(tmp_path, monkeypatch):
     target = tmp_path / "out.h5"
     fsync = os.fsync
 
@@ -120,7 +118,7 @@ def test_a_file_that_appears_late_is_not_replaced(tmp_path: Path, monkeypatch: p
     assert_untouched(target)
 
 
-def test_the_permissions_are_those_of_the_umask(tmp_path: Path):
+def test_the_permissions_are_those_of_the_umask(tmp_path):
     before = os.umask(0o027)
     try:
         atomic_write_bytes(tmp_path / "a", b"")
@@ -129,7 +127,7 @@ def test_the_permissions_are_those_of_the_umask(tmp_path: Path):
     assert stat.S_IMODE((tmp_path / "a").stat().st_mode) == 0o640
 
 
-def test_a_symbolic_link_is_followed_and_stays(target: Path):
+def test_a_symbolic_link_is_followed_and_stays(target):
     link = target.parent / "link.h5"
     link.symlink_to(target)
     write_new(link)
@@ -137,7 +135,7 @@ def test_a_symbolic_link_is_followed_and_stays(target: Path):
     assert target.read_bytes() == b"new"
 
 
-def test_a_folder_a_pipe_and_a_device_are_refused_as_outputs(tmp_path: Path):
+def test_a_folder_a_pipe_and_a_device_are_refused_as_outputs(tmp_path):
     os.mkfifo(tmp_path / "pipe")
     assert_refused(tmp_path, "is a folder")
     for path in (tmp_path / "pipe", os.devnull):
@@ -153,7 +151,7 @@ def test_a_folder_a_pipe_and_a_device_are_refused_as_outputs(tmp_path: Path):
         ("", "not the name"),
     ],
 )
-def test_a_path_that_cannot_exist_is_refused_with_its_cure(tmp_path: Path, name, words):
+def test_a_path_that_cannot_exist_is_refused_with_its_cure(tmp_path, name, words):
     (tmp_path / "file").write_bytes(b"")
     assert_refused(str(tmp_path / name) if name else "", words)
 
@@ -185,7 +183,7 @@ def write_together(paths: list[Path], stop: BaseException | None = None) -> None
 @pytest.mark.parametrize("hard_links", [True, False])
 @pytest.mark.parametrize("failing", ["a", "b", "c"])
 def test_files_that_are_written_together_are_all_new_or_all_as_before(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, hard_links, failing
+    tmp_path, monkeypatch, hard_links, failing
 ):
     """Every rename in turn fails; without hard links the message says which file is new."""
     paths = three(tmp_path)
@@ -210,7 +208,7 @@ def test_files_that_are_written_together_are_all_new_or_all_as_before(
 
 
 @pytest.mark.parametrize("mode", [0o600, 0o640, 0o444, 0o755])
-def test_a_file_that_is_replaced_keeps_its_permissions(target: Path, mode):
+def test_a_file_that_is_replaced_keeps_its_permissions(target, mode):
     target.chmod(mode)
     write_new(target)
     assert stat.S_IMODE(target.stat().st_mode) == mode
@@ -224,7 +222,7 @@ atomic_write_bytes(sys.argv[1], b"new")
 """
 
 
-def test_a_later_run_removes_what_a_killed_process_left_and_nothing_of_a_living_one(tmp_path: Path):
+def test_a_later_run_removes_what_a_killed_process_left_and_nothing_of_a_living_one(tmp_path):
     """However old it is, a file whose process lives stays; so does what is no file of ours."""
     command = [sys.executable, "-c", KILLED, str(tmp_path / "out")]
     with subprocess.Popen(command, stdout=subprocess.PIPE) as process:

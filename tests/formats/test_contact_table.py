@@ -42,7 +42,7 @@ def entry(folder: Path, key: str = KEY) -> Path:
     return folder / f"{key}.h5"
 
 
-def test_a_table_comes_back_bit_for_bit_also_what_is_infinite_or_unknown(tmp_path: Path):
+def test_a_table_comes_back_bit_for_bit_also_what_is_infinite_or_unknown(tmp_path):
     one = table()
     assert keep_contact_table(tmp_path / "made" / "anew", KEY, one)
     found = find_contact_table(tmp_path / "made" / "anew", KEY)
@@ -52,7 +52,7 @@ def test_a_table_comes_back_bit_for_bit_also_what_is_infinite_or_unknown(tmp_pat
 
 
 @pytest.mark.parametrize("share", [0.0, 0.3, 0.99])
-def test_a_file_that_was_cut_off_is_not_found_and_is_replaced(tmp_path: Path, share):
+def test_a_file_that_was_cut_off_is_not_found_and_is_replaced(tmp_path, share):
     keep_contact_table(tmp_path, KEY, table())
     data = entry(tmp_path).read_bytes()
     entry(tmp_path).write_bytes(data[: int(share * len(data))])
@@ -61,7 +61,7 @@ def test_a_file_that_was_cut_off_is_not_found_and_is_replaced(tmp_path: Path, sh
     assert find_contact_table(tmp_path, KEY) is not None
 
 
-def test_bytes_that_were_changed_never_give_other_numbers(tmp_path: Path):
+def test_bytes_that_were_changed_never_give_other_numbers(tmp_path):
     keep_contact_table(tmp_path, KEY, table())
     data = entry(tmp_path).read_bytes()
     one = table()
@@ -73,14 +73,14 @@ def test_bytes_that_were_changed_never_give_other_numbers(tmp_path: Path):
         assert found is None or np.array_equal(found["spectra"], one["spectra"])
 
 
-def test_a_table_under_the_name_of_another_is_not_taken_for_it(tmp_path: Path):
+def test_a_table_under_the_name_of_another_is_not_taken_for_it(tmp_path):
     other = table_key({"load": 2.75})
     keep_contact_table(tmp_path, other, table())
     entry(tmp_path, other).rename(entry(tmp_path))
     assert find_contact_table(tmp_path, KEY) is None
 
 
-def test_a_file_of_another_kind_or_version_is_not_found(tmp_path: Path):
+def test_a_file_of_another_kind_or_version_is_not_found(tmp_path):
     write_tree(file_tree("another-kind", Group("NXentry", {"key": KEY})), entry(tmp_path))
     assert find_contact_table(tmp_path, KEY) is None
     keep_contact_table(tmp_path, KEY, table())
@@ -89,7 +89,7 @@ def test_a_file_of_another_kind_or_version_is_not_found(tmp_path: Path):
     assert find_contact_table(tmp_path, KEY) is None
 
 
-def test_a_folder_that_cannot_be_made_costs_no_result(tmp_path: Path):
+def test_a_folder_that_cannot_be_made_costs_no_result(tmp_path):
     (tmp_path / "file").write_text("not a folder")
     assert not keep_contact_table(tmp_path / "file", KEY, table())
     assert not keep_contact_table(tmp_path / "file" / "below", KEY, table())
@@ -97,7 +97,7 @@ def test_a_folder_that_cannot_be_made_costs_no_result(tmp_path: Path):
     assert (tmp_path / "file").read_text() == "not a folder"
 
 
-def test_the_tables_used_longest_ago_make_room(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_the_tables_used_longest_ago_make_room(tmp_path, monkeypatch):
     monkeypatch.setattr(contact_table, "_MOST_ENTRIES", 3)
     keys = [table_key({"number": number}) for number in range(4)]
     for age, key in enumerate(keys[:3]):
@@ -108,7 +108,7 @@ def test_the_tables_used_longest_ago_make_room(tmp_path: Path, monkeypatch: pyte
     assert {key for key in keys if entry(tmp_path, key).exists()} == {keys[0], keys[2], keys[3]}
 
 
-def test_several_may_write_and_read_one_entry_at_a_time(tmp_path: Path):
+def test_several_may_write_and_read_one_entry_at_a_time(tmp_path):
     large = table(3)
     small = {name: array for name, array in large.items() if not name.startswith("change_")}
 

@@ -49,7 +49,7 @@ CHANGES = {
 
 
 @pytest.mark.parametrize("change", CHANGES.values(), ids=CHANGES)
-def test_an_artifact_that_was_altered_is_refused(artifact: Path, change):
+def test_an_artifact_that_was_altered_is_refused(artifact, change):
     with h5py.File(artifact, "r+") as file:
         change(file)
     with pytest.raises(FormatError, match=r"a\.h5 was changed after it was written") as caught:
@@ -57,7 +57,7 @@ def test_an_artifact_that_was_altered_is_refused(artifact: Path, change):
     assert "calibration" in caught.value.cure
 
 
-def test_a_copy_made_by_another_program_still_fits_its_digest(artifact: Path, tmp_path: Path):
+def test_a_copy_made_by_another_program_still_fits_its_digest(artifact, tmp_path):
     """The digest is over the content, not over the bytes of the file."""
     with h5py.File(artifact) as old, h5py.File(tmp_path / "copy.h5", "w", libver="latest") as new:
         old.copy("/entry", new)
@@ -67,7 +67,7 @@ def test_a_copy_made_by_another_program_still_fits_its_digest(artifact: Path, tm
     assert load_apparatus(tmp_path / "copy.h5").load == 1.0
 
 
-def test_what_other_programs_add_is_ignored(artifact: Path):
+def test_what_other_programs_add_is_ignored(artifact):
     with h5py.File(artifact, "r+") as file:
         file["/entry/my_notes"] = "added later"
         file["/entry/parameters/budget/added"] = 1.0
@@ -89,9 +89,7 @@ READERS: dict[str, Any] = {
 
 
 @pytest.mark.parametrize(("kind", "path"), [(k, p) for k, of in ADDITIONS.items() for p in of])
-def test_no_reader_uses_what_was_added_or_changed_unless_that_is_accepted(
-    tmp_path: Path, kind: str, path: str
-):
+def test_no_reader_uses_what_was_added_or_changed_unless_that_is_accepted(tmp_path, kind, path):
     """A path that the reader knows and the list lacks, and a number that does not fit."""
     file_path = tmp_path / f"{kind}.h5"
     if kind == "scan":
@@ -148,13 +146,13 @@ def versioned(request: pytest.FixtureRequest, tmp_path: Path) -> Any:
 
 
 @pytest.mark.parametrize("version", ["2.0.0", "10.1.0"])
-def test_a_newer_major_version_is_refused_in_plain_words(versioned: Any, version):
+def test_a_newer_major_version_is_refused_in_plain_words(versioned, version):
     with pytest.raises(SchemaVersionError, match=rf"newer memscal(.|\n)*{version}(.|\n)*Upgrade"):
         versioned(version)
 
 
 @pytest.mark.parametrize("version", ["1.0.0", SCHEMA_VERSION, "1.7.3"])
-def test_a_newer_minor_version_with_unknown_content_is_read(versioned: Any, version):
+def test_a_newer_minor_version_with_unknown_content_is_read(versioned, version):
     assert versioned(version).load == 1.0
 
 
@@ -165,7 +163,7 @@ def test_a_newer_minor_version_with_unknown_content_is_read(versioned: Any, vers
         ("/entry/radial_profile/g", lambda g: g[:-1], r"shape \(40,\), but its axes give \(41,\)"),
     ],
 )
-def test_arrays_that_do_not_fit_each_other_are_refused(artifact: Path, path, change, message):
+def test_arrays_that_do_not_fit_each_other_are_refused(artifact, path, change, message):
     with h5py.File(artifact, "r+") as file:
         values = change(file[path][()])
         del file[path]
@@ -177,14 +175,14 @@ def test_arrays_that_do_not_fit_each_other_are_refused(artifact: Path, path, cha
 
 
 @pytest.mark.parametrize("version", ["", "one", "-1", "²", "0.9.0"])
-def test_an_older_major_version_and_what_is_none_are_refused(versioned: Any, version):
+def test_an_older_major_version_and_what_is_none_are_refused(versioned, version):
     refusals = (SchemaVersionError, "not read any more"), (FormatError, "not a version")
     error, words = refusals[version != "0.9.0"]
     with pytest.raises(error, match=words):
         versioned(version)
 
 
-def test_the_wrong_kind_of_file_is_refused_by_name(artifact: Path, tmp_path: Path):
+def test_the_wrong_kind_of_file_is_refused_by_name(artifact, tmp_path):
     with pytest.raises(FormatError, match=r'"memscal-artifact", but "memscal-scan"'):
         read_scan(artifact)
     with h5py.File(tmp_path / "foreign.h5", "w") as file:

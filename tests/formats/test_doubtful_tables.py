@@ -90,7 +90,7 @@ LVM = "Channels\t2\t\nX0\t0.0\t0.0\n***End_of_Header***\t\t\nt\tx (mm)\tU (mV)\t
         ("# x,U,V~{X},{U},{V}&# U,x,V~{U},{X},{V}", NO_UNITS, "again in line 17"),
     ],
 )
-def test_what_two_readings_of_a_table_could_mean_is_asked(tmp_path: Path, tables, options, words):
+def test_what_two_readings_of_a_table_could_mean_is_asked(tmp_path, tables, options, words):
     with pytest.raises(InputError, match=words):
         scan_of(tmp_path, tables, **options)
 
@@ -121,13 +121,13 @@ def test_what_two_readings_of_a_table_could_mean_is_asked(tmp_path: Path, tables
         ("x (mm),U (mV)~{X},{U}\n# U here", {}),
     ],
 )
-def test_what_reads_well_is_read(tmp_path: Path, tables, options):
+def test_what_reads_well_is_read(tmp_path, tables, options):
     scan = scan_of(tmp_path, tables, **options)
     np.testing.assert_allclose(scan.x, X * 1e-3, rtol=1e-12)
     np.testing.assert_allclose(scan.u_zz, U * 1e-3, rtol=1e-12)
 
 
-def test_an_option_settles_what_was_asked(tmp_path: Path):
+def test_an_option_settles_what_was_asked(tmp_path):
     decimal = scan_of(tmp_path, "x (mm)\tU (1)~{WHOLE}\t{COUNT}", decimal=",")
     assert decimal.u_zz[1] == 12.004
     assert scan_of(tmp_path, "0,1~{X},{U}", **BY_NUMBER, skip_rows=0).x.size == N + 1
@@ -162,7 +162,7 @@ def test_other_columns_of_a_table_in_memory_are_looked_at(name):
         ("x (Mm),U (mV)~{X},{U}", None, "mm meant"),
     ],
 )
-def test_a_unit_of_a_size_that_nobody_has_is_asked_about(tmp_path: Path, tables, noise, words):
+def test_a_unit_of_a_size_that_nobody_has_is_asked_about(tmp_path, tables, noise, words):
     with pytest.warns(UnitWarning, match=words):
         scan_of(tmp_path, tables, noise=noise)
 

@@ -99,13 +99,13 @@ def assert_refused_cheaply(path: Path, *words: str) -> None:
     assert peak < 20 * path.stat().st_size + 2**22
 
 
-def test_an_external_link_to_a_pipe_is_refused_without_waiting(edited: Edit, tmp_path: Path):
+def test_an_external_link_to_a_pipe_is_refused_without_waiting(edited, tmp_path):
     os.mkfifo(tmp_path / "pipe.h5")
     path = edited(lambda g: g.__setitem__("u_zz", h5py.ExternalLink("pipe.h5", "/x")))
     assert_refused_cheaply(path, "link")
 
 
-def test_a_soft_link_half_way_along_the_path_is_refused(path: Path):
+def test_a_soft_link_half_way_along_the_path_is_refused(path):
     with h5py.File(path, "r+") as file:
         file.move("/entry/data", "/entry/hidden")
         file["/entry/data"] = h5py.SoftLink("/entry/hidden")
@@ -113,7 +113,7 @@ def test_a_soft_link_half_way_along_the_path_is_refused(path: Path):
         read_scan(path)
 
 
-def test_external_storage_is_refused_and_the_other_file_stays_unread(edited: Edit, tmp_path: Path):
+def test_external_storage_is_refused_and_the_other_file_stays_unread(edited, tmp_path):
     secret = tmp_path / "secret.bin"
     secret.write_bytes(np.full(33, 42.0).tobytes())
     before = secret.stat().st_atime_ns
@@ -157,7 +157,7 @@ def test_external_storage_is_refused_and_the_other_file_stays_unread(edited: Edi
         (lambda g: g.create_dataset("u_zz", data=h5py.Empty("f8")), "null dataspace"),
     ],
 )
-def test_a_dataset_that_cannot_be_read_safely_is_refused(edited: Edit, make, words):
+def test_a_dataset_that_cannot_be_read_safely_is_refused(edited, make, words):
     path = edited(make)
     assert path.stat().st_size < 2**20
     assert_refused_cheaply(path, words)
@@ -178,7 +178,7 @@ def compressed(size: int) -> bytes:
     ids=["gzip", "all"],
 )
 @pytest.mark.parametrize("number", [2**25, 1023, 0])
-def test_a_chunk_that_does_not_unpack_to_its_size_is_refused(edited: Edit, filters, number):
+def test_a_chunk_that_does_not_unpack_to_its_size_is_refused(edited, filters, number):
     """HDF5 unpacks all of it: of half a megabyte 562 MB were held, and the file passed."""
 
     def make(group: h5py.Group) -> h5py.Dataset:
@@ -192,7 +192,7 @@ def test_a_chunk_that_does_not_unpack_to_its_size_is_refused(edited: Edit, filte
 
 
 @pytest.mark.parametrize("order", ["shuffle deflate fletcher32", "fletcher32 deflate"])
-def test_a_packed_chunk_is_read_whatever_the_order_of_its_filters(edited: Edit, order):
+def test_a_packed_chunk_is_read_whatever_the_order_of_its_filters(edited, order):
     options = {"deflate": (6,), "shuffle": (8,), "fletcher32": ()}
     filters = [
         (getattr(h5py.h5z, f"FILTER_{name.upper()}"), options[name]) for name in order.split()
@@ -206,7 +206,7 @@ def test_a_packed_chunk_is_read_whatever_the_order_of_its_filters(edited: Edit, 
     np.testing.assert_allclose(read_scan(edited(make)).u_zz, np.arange(33.0) * 1e-3)
 
 
-def test_records_of_attributes_that_are_forged_by_the_thousand_are_not_all_followed(path: Path):
+def test_records_of_attributes_that_are_forged_by_the_thousand_are_not_all_followed(path):
     """Of 32 MB of them each was followed, which took 40 s."""
     copy = path.with_name("copy.h5")
     with h5py.File(path) as ours, h5py.File(copy, "w", libver="latest") as file:
@@ -224,7 +224,7 @@ def test_records_of_attributes_that_are_forged_by_the_thousand_are_not_all_follo
     read_scan(path)
 
 
-def test_a_virtual_dataset_with_a_missing_source_is_refused(edited: Edit):
+def test_a_virtual_dataset_with_a_missing_source_is_refused(edited):
     layout = h5py.VirtualLayout((33,), "f8")
     layout[:] = h5py.VirtualSource("missing.h5", "/x", (33,))
     assert_refused_cheaply(edited(lambda g: g.create_virtual_dataset("u_zz", layout)), "virtual")
@@ -239,7 +239,7 @@ def test_a_virtual_dataset_with_a_missing_source_is_refused(edited: Edit):
     ],
 )
 def test_filters_that_expand_twice_or_load_foreign_code_are_refused(
-    edited: Edit, code, options, times, words
+    edited, code, options, times, words
 ):
     filters = [(code, options)] * times
     path = edited(lambda g: filtered(g, 2**20, 2**20, h5py.h5z.FLAG_OPTIONAL, filters))
@@ -259,7 +259,7 @@ def test_filters_that_expand_twice_or_load_foreign_code_are_refused(
     ],
     ids=["vlen", "vlen text", "compound", "complex", "text", "opaque", "enum"],
 )
-def test_a_type_that_is_no_plain_number_is_refused(edited: Edit, dtype, value):
+def test_a_type_that_is_no_plain_number_is_refused(edited, dtype, value):
     def make(group: h5py.Group) -> Any:
         dataset = group.create_dataset("u_zz", (2**16,), dtype)  # a bomb, were it to be expanded
         dataset[0] = value
@@ -268,14 +268,12 @@ def test_a_type_that_is_no_plain_number_is_refused(edited: Edit, dtype, value):
     assert_refused_cheaply(edited(make), "numbers")
 
 
-def test_a_group_in_the_place_of_a_dataset_is_refused(edited: Edit):
+def test_a_group_in_the_place_of_a_dataset_is_refused(edited):
     with pytest.raises(FormatError, match=f"{SIGNAL} is not a dataset"):
         read_scan(edited(lambda g: g.create_group("u_zz")))
 
 
-def test_one_dataset_of_many_names_meets_the_limit_of_the_file(
-    edited: Edit, monkeypatch: pytest.MonkeyPatch
-):
+def test_one_dataset_of_many_names_meets_the_limit_of_the_file(edited, monkeypatch):
     monkeypatch.setattr(limits, "MOST_HDF5_BYTES", 2**17)
 
     def make(group: h5py.Group) -> None:
@@ -300,7 +298,7 @@ def test_one_dataset_of_many_names_meets_the_limit_of_the_file(
     ],
     ids=["null", "many", "table", "reference", "long"],
 )
-def test_an_attribute_that_is_no_short_text_is_refused(edited: Edit, value):
+def test_an_attribute_that_is_no_short_text_is_refused(edited, value):
     path = edited(lambda g: g.create_dataset("u_zz", data=np.zeros(33)))
     with h5py.File(path, "r+") as file:
         if isinstance(value, np.ndarray) and value.dtype == h5py.ref_dtype:
@@ -311,7 +309,7 @@ def test_an_attribute_that_is_no_short_text_is_refused(edited: Edit, value):
         read_scan(path)
 
 
-def test_text_from_a_file_cannot_steer_the_terminal(path: Path):
+def test_text_from_a_file_cannot_steer_the_terminal(path):
     with h5py.File(path, "r+") as file:
         del file["/entry/title"]
         file["/entry/title"] = b"\x1b[2J\x07title \xff\xc3"
@@ -320,7 +318,7 @@ def test_text_from_a_file_cannot_steer_the_terminal(path: Path):
 
 @pytest.mark.parametrize("libver", ["earliest", "v108", "latest"])
 @pytest.mark.parametrize("further", [0, 5, 30])
-def test_variable_text_is_read_in_every_version_of_the_format(tmp_path: Path, libver, further):
+def test_variable_text_is_read_in_every_version_of_the_format(tmp_path, libver, further):
     """Where attributes are many, HDF5 moves them out of the object's header."""
     write_scan(make_scan(), tmp_path / "ours.h5")
     path = tmp_path / "scan.h5"
@@ -344,7 +342,7 @@ def test_variable_text_is_read_in_every_version_of_the_format(tmp_path: Path, li
 
 @pytest.mark.parametrize("further", [0, 30])
 @pytest.mark.parametrize("place", ["dataset", "attribute"])
-def test_a_variable_text_that_claims_four_gibibytes_is_refused(tmp_path: Path, further, place):
+def test_a_variable_text_that_claims_four_gibibytes_is_refused(tmp_path, further, place):
     path = tmp_path / "scan.h5"
     marker = "a text of 33 bytes to be found..."
     write_scan(make_scan(), path)
@@ -363,7 +361,7 @@ def test_a_variable_text_that_claims_four_gibibytes_is_refused(tmp_path: Path, f
         read_scan(path)
 
 
-def test_a_text_dataset_longer_than_any_text_is_refused(path: Path):
+def test_a_text_dataset_longer_than_any_text_is_refused(path):
     with h5py.File(path, "r+") as file:
         del file["/entry/title"]
         file["/entry"].create_dataset("title", data=np.bytes_(b"a" * (2**22 + 1)))
@@ -371,7 +369,7 @@ def test_a_text_dataset_longer_than_any_text_is_refused(path: Path):
         read_scan(path)
 
 
-def test_a_folder_a_device_and_a_pipe_are_refused_without_waiting(tmp_path: Path):
+def test_a_folder_a_device_and_a_pipe_are_refused_without_waiting(tmp_path):
     os.mkfifo(tmp_path / "pipe")
     with pytest.raises(InputError, match="is not a regular file"):
         read_scan(tmp_path)
@@ -380,14 +378,14 @@ def test_a_folder_a_device_and_a_pipe_are_refused_without_waiting(tmp_path: Path
             read_scan(path)
 
 
-def test_a_missing_file_and_a_name_that_is_none_are_input_errors(tmp_path: Path):
+def test_a_missing_file_and_a_name_that_is_none_are_input_errors(tmp_path):
     with pytest.raises(InputError, match=r"missing\.h5 cannot be read: No such file"):
         read_scan(tmp_path / "missing.h5")
     with pytest.raises(InputError, match="cannot be read"):
         read_scan("a\0b")
 
 
-def test_a_file_over_the_size_limit_is_refused_unread(tmp_path: Path):
+def test_a_file_over_the_size_limit_is_refused_unread(tmp_path):
     path = tmp_path / "large.h5"
     with path.open("wb") as file:
         file.truncate(2**30 + 1)  # sparse: it takes no room on the disk
@@ -395,7 +393,7 @@ def test_a_file_over_the_size_limit_is_refused_unread(tmp_path: Path):
         read_scan(path)
 
 
-def test_every_truncation_is_an_error_of_ours(path: Path):
+def test_every_truncation_is_an_error_of_ours(path):
     data = path.read_bytes()
     for length in [*range(0, 2048, 64), *range(2048, len(data), 1999), len(data) - 1]:
         path.write_bytes(data[:length])
@@ -404,7 +402,7 @@ def test_every_truncation_is_an_error_of_ours(path: Path):
     assert "Get the file again" in caught.value.cure
 
 
-def test_bytes_flipped_all_over_a_scan_neither_crash_nor_hang_a_process(path: Path):
+def test_bytes_flipped_all_over_a_scan_neither_crash_nor_hang_a_process(path):
     """And all over a heap of texts. HDF5 could crash, or walk through them for ever."""
     with h5py.File(path, "r+") as file:
         del file["/entry/title"], file["/entry/data/x"].attrs["units"]
@@ -416,7 +414,7 @@ def test_bytes_flipped_all_over_a_scan_neither_crash_nor_hang_a_process(path: Pa
     assert min(read, refused) > 0
 
 
-def test_the_plugin_path_is_off_before_the_hdf5_library_starts(tmp_path: Path):
+def test_the_plugin_path_is_off_before_the_hdf5_library_starts(tmp_path):
     plugins = tmp_path / "plugins"
     plugins.mkdir()
     (plugins / "libforeign.so").write_bytes(b"never loaded")

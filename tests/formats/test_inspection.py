@@ -26,7 +26,7 @@ def folder(tmp_path: Path) -> Path:
 
 
 @pytest.mark.parametrize("name", ["scan", "reference", "artifact"])
-def test_a_sound_file_is_found_in_order_and_described_in_standard_json(folder: Path, name):
+def test_a_sound_file_is_found_in_order_and_described_in_standard_json(folder, name):
     path = folder / f"{name}.h5"
     passed = {f.name: f.passed for f in check(path)}
     assert list(passed.items()) == [(n, True) for n in ("safety", "schema", "digest", "content")]
@@ -35,7 +35,7 @@ def test_a_sound_file_is_found_in_order_and_described_in_standard_json(folder: P
     assert json.loads(json.dumps(found, allow_nan=False)) == found
 
 
-def test_a_scan_of_another_program_fails_at_what_it_lacks(folder: Path):
+def test_a_scan_of_another_program_fails_at_what_it_lacks(folder):
     with h5py.File(folder / "scan.h5", "r+") as file:
         del file.attrs["memscal_content_sha256"], file["/entry/indenter/radius"]
     last = check(folder / "scan.h5")[-1]
@@ -43,7 +43,7 @@ def test_a_scan_of_another_program_fails_at_what_it_lacks(folder: Path):
     assert "/entry/indenter/radius" in last.meaning
 
 
-def test_an_uncertainty_without_a_value_is_refused_by_its_path(folder: Path):
+def test_an_uncertainty_without_a_value_is_refused_by_its_path(folder):
     with h5py.File(folder / "reference.h5", "r+") as file:
         del file.attrs["memscal_content_sha256"]
         file["/entry/parameters/depth_errors"] = np.zeros(0)
@@ -53,7 +53,7 @@ def test_an_uncertainty_without_a_value_is_refused_by_its_path(folder: Path):
 
 
 @pytest.mark.parametrize("number", ["NaN", "Infinity", "-Infinity", "1e999"])
-def test_stored_json_with_a_number_that_is_none_is_refused(folder: Path, number: str):
+def test_stored_json_with_a_number_that_is_none_is_refused(folder, number):
     with h5py.File(folder / "artifact.h5", "r+") as file:
         text = file["/entry/process/configuration/data"][()].decode()
         del file["/entry/process/configuration/data"]
@@ -63,7 +63,7 @@ def test_stored_json_with_a_number_that_is_none_is_refused(folder: Path, number:
             read(folder / "artifact.h5", accept_altered=True)
 
 
-def test_what_is_no_file_of_ours_fails_at_the_first_step(tmp_path: Path):
+def test_what_is_no_file_of_ours_fails_at_the_first_step(tmp_path):
     (tmp_path / "a.h5").write_bytes(b"text")
     with h5py.File(tmp_path / "b.h5", "w"):
         pass
@@ -73,7 +73,7 @@ def test_what_is_no_file_of_ours_fails_at_the_first_step(tmp_path: Path):
         assert finding.meaning
 
 
-def test_a_newer_version_fails_at_the_schema(folder: Path):
+def test_a_newer_version_fails_at_the_schema(folder):
     with h5py.File(folder / "scan.h5", "r+") as file:
         file.attrs["memscal_schema_version"] = "2.0.0"
     last = check(folder / "scan.h5")[-1]
@@ -81,7 +81,7 @@ def test_a_newer_version_fails_at_the_schema(folder: Path):
     assert "newer" in last.meaning
 
 
-def test_the_time_is_that_of_the_build_where_one_is_given(monkeypatch: pytest.MonkeyPatch):
+def test_the_time_is_that_of_the_build_where_one_is_given(monkeypatch):
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "1700000000")
     assert timestamp() == "2023-11-14T22:13:20+00:00"
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "")

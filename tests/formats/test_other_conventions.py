@@ -48,7 +48,7 @@ def path(tmp_path: Path) -> Path:
 
 @pytest.mark.parametrize("order", ["yx", "xy"])
 @pytest.mark.parametrize("way", WAYS)
-def test_a_square_raster_lies_as_its_axes_are_stated(path: Path, way: str, order: str):
+def test_a_square_raster_lies_as_its_axes_are_stated(path, way, order):
     with pytest.raises(InputError, match=r"nothing states which axis is which(.|\n)*axes to"):
         read_scan(path)
     with h5py.File(path, "r+") as file:
@@ -63,7 +63,7 @@ def test_a_square_raster_lies_as_its_axes_are_stated(path: Path, way: str, order
         read_scan(path)
 
 
-def test_names_of_a_signals_own_for_its_axes_state_nothing(path: Path):
+def test_names_of_a_signals_own_for_its_axes_state_nothing(path):
     with h5py.File(path, "r+") as file:
         WAYS["list"](file["/entry/data"], "yx")
         file["/entry/data/u_zz"].attrs["axes"] = "row:column"
@@ -90,7 +90,7 @@ LARGEST = U.max()
         ({}, ("u_zz_mask",), True),
     ],
 )
-def test_numbers_that_another_statement_changes_are_refused(path: Path, stated, beside, changed):
+def test_numbers_that_another_statement_changes_are_refused(path, stated, beside, changed):
     with h5py.File(path, "r+") as file:
         scales(file["/entry/data"], "yx")
         file["/entry/data/u_zz"].attrs.update(stated)

@@ -56,7 +56,7 @@ def items(path: Path) -> tuple[list[str], dict[str, Any]]:
     return groups, datasets
 
 
-def test_silx_finds_every_nxdata_valid_and_the_right_default(path: Path, kind: str):
+def test_silx_finds_every_nxdata_valid_and_the_right_default(path, kind):
     found = 0
     with h5py.File(path) as file:
         for group in items(path)[0]:
@@ -68,7 +68,7 @@ def test_silx_finds_every_nxdata_valid_and_the_right_default(path: Path, kind: s
     assert found == {"artifact": 6, "reference": 1, "plain line": 1}.get(kind, 2)
 
 
-def test_nexusformat_reports_no_error(path: Path):
+def test_nexusformat_reports_no_error(path):
     warnings, errors = validate_file(str(path))
     assert errors == 0
     # Our own are the root's schema, its version and digest; the sensor's channel, serial number,
@@ -76,7 +76,7 @@ def test_nexusformat_reports_no_error(path: Path):
     assert warnings <= 11
 
 
-def test_xarray_opens_every_group_without_a_warning(path: Path):
+def test_xarray_opens_every_group_without_a_warning(path):
     for group in items(path)[0]:
         with xarray.open_dataset(path, engine="h5netcdf", group=group) as dataset:
             dataset.load()
@@ -91,7 +91,7 @@ def test_xarray_opens_every_group_without_a_warning(path: Path):
     ("repeats", "data", "u_zz", ("repeat", "x"), "mV"),
     ("points", "data", "y", ("point",), "mm"),
 ], indirect=["kind"])  # fmt: skip
-def test_xarray_gives_dimensions_in_order_with_units(path: Path, group, name, dims, units):
+def test_xarray_gives_dimensions_in_order_with_units(path, group, name, dims, units):
     with xarray.open_dataset(path, engine="h5netcdf", group=f"/entry/{group}") as dataset:
         assert dataset[name].dims == dims
         assert dataset[name].attrs["units"] == units
@@ -99,7 +99,7 @@ def test_xarray_gives_dimensions_in_order_with_units(path: Path, group, name, di
             assert dim in dataset.coords
 
 
-def test_netcdf4_opens_every_group_and_reads_every_variable(path: Path):
+def test_netcdf4_opens_every_group_and_reads_every_variable(path):
     groups, datasets = items(path)
     read = 0
     with netCDF4.Dataset(path) as file:
@@ -111,7 +111,7 @@ def test_netcdf4_opens_every_group_and_reads_every_variable(path: Path):
     assert read == len(datasets)
 
 
-def test_every_number_has_a_unit_and_every_array_a_scale_on_every_axis(path: Path):
+def test_every_number_has_a_unit_and_every_array_a_scale_on_every_axis(path):
     for name, (shape, dtype, attributes) in items(path)[1].items():
         if h5py.check_string_dtype(dtype) is not None:
             continue
@@ -123,7 +123,7 @@ def test_every_number_has_a_unit_and_every_array_a_scale_on_every_axis(path: Pat
                 assert [scale.shape for scale in file[name].dims[i].values()] == [(length,)], name
 
 
-def test_names_are_lower_case_and_links_are_hard(path: Path):
+def test_names_are_lower_case_and_links_are_hard(path):
     groups, datasets = items(path)
     for name in [*groups, *datasets]:
         assert name == name.lower()

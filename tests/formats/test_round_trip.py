@@ -24,12 +24,11 @@ from memscal.model.checks import Message, QualityCheck, messages_from_json
 from memscal.model.field_mesh import FieldMesh
 from memscal.model.indenter import Sphere
 from memscal.model.provenance import SourceFile
-from memscal.model.stress import StressProfile
 
 
 @pytest.mark.parametrize("kind", ["line", "repeats", "raster", "points"])
 @pytest.mark.parametrize("direction", ["x", "y"])
-def test_all_that_a_scan_may_state_comes_back(tmp_path: Path, kind, direction):
+def test_all_that_a_scan_may_state_comes_back(tmp_path, kind, direction):
     path = tmp_path / "scan.h5"
     plain = make_scan(kind)
     film = dataclasses.replace(plain.film, name="film A")
@@ -84,12 +83,12 @@ ABSENT = "sigma_rz depth contact_radius stick_radius friction_coefficient film i
     ],
     ids=["whole", "only a table"],
 )
-def test_a_reference_comes_back(tmp_path: Path, profile: StressProfile):
+def test_a_reference_comes_back(tmp_path, profile):
     write_reference(profile, tmp_path / "a.h5")
     assert_same(read_reference(tmp_path / "a.h5"), profile, but=("source",))
 
 
-def test_a_reference_in_a_scan_without_parameters_takes_its_load_but_no_film(tmp_path: Path):
+def test_a_reference_in_a_scan_without_parameters_takes_its_load_but_no_film(tmp_path):
     path = tmp_path / "scan.h5"
     write_scan(make_scan(load=2.5), path)
     with h5py.File(path, "r+") as file:
@@ -99,14 +98,14 @@ def test_a_reference_in_a_scan_without_parameters_takes_its_load_but_no_film(tmp
     assert (found.load, found.film, found.indenter is not None) == (2.5, None, False)
 
 
-def test_an_artifact_comes_back(tmp_path: Path):
+def test_an_artifact_comes_back(tmp_path):
     write_artifact(make_artifact(), tmp_path / "a.h5")
     found = load_apparatus(tmp_path / "a.h5")
     assert_same(found, make_artifact(), but=("source", "units"))
     assert found.parameters.units == ("V/Pa", "m", "m", "m", "V")
 
 
-def test_a_parameter_of_an_unknown_name_needs_a_unit_and_keeps_it(tmp_path: Path):
+def test_a_parameter_of_an_unknown_name_needs_a_unit_and_keeps_it(tmp_path):
     values = np.array([2.0])
     covariance = np.eye(1)
     unnamed = make_artifact(parameters=ParameterSet(("tilt",), values, covariance), budget={})
@@ -121,14 +120,14 @@ def test_a_parameter_of_an_unknown_name_needs_a_unit_and_keeps_it(tmp_path: Path
 
 
 @pytest.mark.parametrize("name", ["names", "Größe", "../x", "a/b", "a b", ""])
-def test_a_parameter_name_that_cannot_stand_in_a_file_is_refused(tmp_path: Path, name):
+def test_a_parameter_name_that_cannot_stand_in_a_file_is_refused(tmp_path, name):
     parameters = ParameterSet((name,), np.ones(1), np.eye(1), units=("m",))
     with pytest.raises(InputError):
         write_artifact(make_artifact(parameters=parameters, budget={}), tmp_path / "a.h5")
     assert not (tmp_path / "a.h5").exists()
 
 
-def test_check_names_are_kept_as_they_are_and_two_alike_are_refused(tmp_path: Path):
+def test_check_names_are_kept_as_they_are_and_two_alike_are_refused(tmp_path):
     check = QualityCheck("Gaussian misfit (far)", 1.0, 2.0, True, "Fine.")
     write_artifact(make_artifact(checks=(check,)), tmp_path / "a.h5")
     assert load_apparatus(tmp_path / "a.h5").checks == (check,)
@@ -143,7 +142,7 @@ def test_the_texts_of_older_files_are_read_as_notes():
     assert texts == [("note", "7", "note"), ("note", "['z']", "note"), ("note", "", "note")]
 
 
-def test_configurations_with_numpy_numbers_and_infinities_are_stored_as_json(tmp_path: Path):
+def test_configurations_with_numpy_numbers_and_infinities_are_stored_as_json(tmp_path):
     configuration = {"seed": np.int64(3), "mu": float("inf"), "loads": np.array([1.0, 2.0])}
     data = make_artifact()
     process = dataclasses.replace(data.process, configuration=configuration)
@@ -169,7 +168,7 @@ MESH = FieldMesh(
         (write_mesh, MESH),
     ],
 )
-def test_a_file_is_replaced_only_where_that_is_asked_for(tmp_path: Path, write, thing):
+def test_a_file_is_replaced_only_where_that_is_asked_for(tmp_path, write, thing):
     path = tmp_path / "a.h5"
     path.write_bytes(b"years of work")
     with pytest.raises(OutputError, match="exists already"):
@@ -192,7 +191,7 @@ finite = st.floats(-1e6, 1e6).map(lambda value: value if abs(value) > 1e-20 else
     notes=st.text(st.characters(categories=["L", "N", "P", "S"]), max_size=200),
     load=st.floats(1e-6, 1e6),
 )
-def test_any_scan_comes_back(tmp_path: Path, x, missing, title, notes, load):
+def test_any_scan_comes_back(tmp_path, x, missing, title, notes, load):
     u = np.where(np.arange(x.size) < missing * x.size, np.nan, x)
     stated = {"x": x, "u_zz": u, "title": title, "notes": notes, "load": load}
     scan = make_scan(**(BARE | stated))
@@ -221,7 +220,7 @@ def other_program(path: Path) -> None:
         file["entry/indenter/shape"] = "rod"
 
 
-def test_a_scan_of_another_program_is_read_in_its_own_units(tmp_path: Path):
+def test_a_scan_of_another_program_is_read_in_its_own_units(tmp_path):
     other_program(tmp_path / "scan.h5")
     scan = read_scan(tmp_path / "scan.h5")
     assert scan.x.tolist() == [-1e-3, 0.0, 0.5e-3]
@@ -287,7 +286,7 @@ FILM = "/entry/sample/film"
     ],
 )
 def test_what_is_missing_or_wrong_is_named_by_file_and_path(
-    tmp_path: Path, path, value, units, error, words
+    tmp_path, path, value, units, error, words
 ):
     other_program(tmp_path / "scan.h5")
     with h5py.File(tmp_path / "scan.h5", "r+") as file:
@@ -301,7 +300,7 @@ def test_what_is_missing_or_wrong_is_named_by_file_and_path(
     assert caught.value.cure or error is not UnitError
 
 
-def test_a_raster_with_its_axes_swapped_or_without_one_is_refused(tmp_path: Path):
+def test_a_raster_with_its_axes_swapped_or_without_one_is_refused(tmp_path):
     for name, words in (("swapped", r"axes(.|\n)*Transpose"), ("one", "y as axis 0")):
         path = tmp_path / f"{name}.h5"
         write_scan(make_scan("raster"), path)

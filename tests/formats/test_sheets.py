@@ -43,7 +43,7 @@ def workbook(path: Path) -> Path:
     return path
 
 
-def test_a_sheet_of_a_workbook_is_read_below_its_title_and_named_by_its_rows(tmp_path: Path):
+def test_a_sheet_of_a_workbook_is_read_below_its_title_and_named_by_its_rows(tmp_path):
     book = workbook(tmp_path / "rod.xlsx")
     scan = imported(book, sheet="Daten", x="x", u="U")
     np.testing.assert_allclose(scan.x, [-8e-3, 0, 8e-3, 9e-3])
@@ -83,7 +83,7 @@ def hide(sheet: Any) -> None:
         (lambda sheet: sheet.merge_cells("C2:C4"), "Read 3 rows"),
     ],
 )
-def test_the_first_visible_sheet_is_read_with_its_hidden_rows_named(tmp_path: Path, change, words):
+def test_the_first_visible_sheet_is_read_with_its_hidden_rows_named(tmp_path, change, words):
     scan = imported(edited(tmp_path / "a.xlsx", change), x="x", u="U")
     np.testing.assert_allclose(scan.u_zz, [1e-3 * u for u in U])
     assert re.search(words, scan.notes)
@@ -101,12 +101,12 @@ def test_the_first_visible_sheet_is_read_with_its_hidden_rows_named(tmp_path: Pa
         ),
     ],
 )
-def test_merged_cells_and_formulas_without_results_are_refused(tmp_path: Path, change, words):
+def test_merged_cells_and_formulas_without_results_are_refused(tmp_path, change, words):
     with pytest.raises(FormatError, match=words):
         imported(edited(tmp_path / "a.xlsx", change), x="x", u="U")
 
 
-def test_a_formula_has_the_result_that_is_stored_and_an_empty_text_is_one(tmp_path: Path):
+def test_a_formula_has_the_result_that_is_stored_and_an_empty_text_is_one(tmp_path):
     path = edited(tmp_path / "a.xlsx", lambda sheet: sheet.__setitem__("B3", "=A3"))
     for stored, u in ((b' t="str"><f>A3</f><v></v>', np.nan), (b"><f>A3</f><v>2</v>", 2e-3)):
         parts = io.BytesIO()
@@ -140,9 +140,7 @@ DOCTYPE = b'<!DOCTYPE a [<!ENTITY b "bb">]>' + SHEET % b"&b;"
         (b"<a", "cannot be"),
     ],
 )
-def test_a_hostile_workbook_is_refused_before_it_takes_memory(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, xml, words
-):
+def test_a_hostile_workbook_is_refused_before_it_takes_memory(tmp_path, monkeypatch, xml, words):
     limits = {"MOST_TAGS": 1000, "MOST_OTHER_TAGS": 1000, "MOST_FILE_BYTES": 2**20}
     for name, limit in limits.items():
         monkeypatch.setattr(sheets, name, limit)
@@ -157,7 +155,7 @@ def test_a_hostile_workbook_is_refused_before_it_takes_memory(
         sheets.open_table(path)
 
 
-def test_parquet_is_read_with_the_units_of_its_fields(tmp_path: Path):
+def test_parquet_is_read_with_the_units_of_its_fields(tmp_path):
     fields = [pa.field("x", pa.float32(), metadata={"units": "mm"}), pa.field("U [uV]", pa.int64())]
     table = pa.table([pa.array(X, pa.float32()), pa.array([1, None, 3])], schema=pa.schema(fields))
     parquet.write_table(table, tmp_path / "rod.parquet")
@@ -184,7 +182,7 @@ def test_parquet_is_read_with_the_units_of_its_fields(tmp_path: Path):
     ],
     ids=["data frame", "mapping", "text with decimal commas"],
 )
-def test_columns_in_memory_are_a_table(frame: Any):
+def test_columns_in_memory_are_a_table(frame):
     scan = imported(frame, x="x", u="U", load=1.0)
     np.testing.assert_allclose(scan.x, [-8e-3, 0, 8e-3], rtol=1e-15)
     np.testing.assert_allclose(scan.u_zz, [0.1e-3, 2e-3, 0.2e-3], rtol=1e-15)
@@ -195,7 +193,7 @@ def test_columns_in_memory_are_a_table(frame: Any):
     ({"x": [1, 2], "u": [1, 2, 3]}, r"shape \(3,\) in 2 rows"), ([1, 2], "no table with columns"),
     ({"x": [1, 2], "u": ["a", 1]}, "not a number in row 1 \\('a'\\)"),
 ])  # fmt: skip
-def test_what_is_no_table_in_memory_is_refused(frame: Any, words):
+def test_what_is_no_table_in_memory_is_refused(frame, words):
     with pytest.raises(InputError, match=words):
         imported(frame, x="x", u="u", x_unit="mm", u_unit="mV")
 
@@ -225,7 +223,7 @@ def test_an_option_that_a_kind_of_table_has_no_use_for_is_refused(name, options,
         imported(name, x="x", u="u", **options)
 
 
-def test_a_workbook_without_openpyxl_names_the_extra(tmp_path: Path, monkeypatch):
+def test_a_workbook_without_openpyxl_names_the_extra(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "openpyxl", None)
     (tmp_path / "b.xlsx").write_bytes(b"PK")
     with pytest.raises(InputError, match=r"openpyxl(.|\n)*memscal\[tables\]"):

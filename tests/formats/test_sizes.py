@@ -66,7 +66,7 @@ ROWS = st.one_of(
     names=st.sampled_from(["xun", "u"]),
 )
 def test_blocks_give_what_the_whole_table_gives(
-    tmp_path_factory: pytest.TempPathFactory, table, delimiter, decimal, end, encoding, names
+    tmp_path_factory, table, delimiter, decimal, end, encoding, names
 ):
     """In small blocks, of which those of bare numbers take another way, and in one."""
     regular = [["0.5", "1", "2"]] * 40
@@ -94,7 +94,7 @@ def big_table(path: Path, rows: int) -> Path:
     return path
 
 
-def test_a_column_that_no_row_has_is_missing_throughout(tmp_path: Path):
+def test_a_column_that_no_row_has_is_missing_throughout(tmp_path):
     path = tmp_path / "t.txt"
     path.write_text("x,u,n,m\n" + "1,2,3\n" * 20_000)
     found = TextTable(path, delimiter=",").columns({"u": Wanted("u"), "m": Wanted("m")})
@@ -112,7 +112,7 @@ print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
 """
 
 
-def test_a_million_rows_take_little_memory(tmp_path: Path):
+def test_a_million_rows_take_little_memory(tmp_path):
     """Ten arrays of 2.4 million bytes: text and cells are never held as a whole."""
     pytest.importorskip("resource")
 
@@ -164,9 +164,7 @@ def test_a_head_is_looked_at_no_further_than_a_block(tmp_path, monkeypatch, line
         TextTable(path)
 
 
-def test_what_is_too_large_is_refused_with_size_limit_and_cure(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-):
+def test_what_is_too_large_is_refused_with_size_limit_and_cure(tmp_path, monkeypatch):
     monkeypatch.setattr(columns, "MOST_ROWS", 100)
     with pytest.raises(InputError, match=r"has 120 lines of 2 columns, but at most 100(.|\n)*Aver"):
         import_table(big_table(tmp_path / "t.csv", 120), x="x", u="u")
@@ -199,7 +197,7 @@ def went_on(*_: Any, **__: Any) -> None:
     pytest.fail("it went on")
 
 
-def test_a_comparison_of_too_many_points_does_nothing(monkeypatch: pytest.MonkeyPatch):
+def test_a_comparison_of_too_many_points_does_nothing(monkeypatch):
     apparatus = made.known_apparatus()
     ones = np.ones(len(made.LOADS))
     none = dict.fromkeys(("u_zz_errors", "x_errors", "normal_load_errors"))

@@ -121,14 +121,14 @@ def old(tmp_path: Path) -> Path:
     return path
 
 
-def test_what_was_saved_and_read_again_is_equal_to_the_last_bit(path: Path):
+def test_what_was_saved_and_read_again_is_equal_to_the_last_bit(path):
     found = memscal.read_stress(path)
     assert found == make_stress()
     assert np.isnan(found.checks[1].value)
     assert len(repr(found)) < 200
 
 
-def test_a_file_of_version_1_0_is_read_with_what_it_holds(old: Path, tmp_path: Path):
+def test_a_file_of_version_1_0_is_read_with_what_it_holds(old, tmp_path):
     found = memscal.read_stress(old)
     [profile] = found.profiles
     assert (profile.load, profile.force, profile.lubrication) == (0.5, 0.505, "dry")
@@ -143,7 +143,7 @@ def test_a_file_of_version_1_0_is_read_with_what_it_holds(old: Path, tmp_path: P
     assert memscal.read_stress(tmp_path / "again.h5") == found
 
 
-def test_other_programs_find_a_plottable_group_for_each_load(path: Path):
+def test_other_programs_find_a_plottable_group_for_each_load(path):
     with h5py.File(path) as file:
         default = file["entry"][file["entry"].attrs["default"]]
         assert default[default.attrs["signal"]].shape == (9,)
@@ -152,7 +152,7 @@ def test_other_programs_find_a_plottable_group_for_each_load(path: Path):
         np.testing.assert_allclose(default["s_zz_errors"][()] ** 2, variance, rtol=1e-12)
 
 
-def test_a_changed_number_is_found_out(path: Path):
+def test_a_changed_number_is_found_out(path):
     with h5py.File(path, "r+") as file:
         file["entry/profile_1/s_zz"][0] *= 1.01
     with pytest.raises(FormatError, match="was changed after it was written"):
@@ -160,7 +160,7 @@ def test_a_changed_number_is_found_out(path: Path):
     assert not all(finding.passed for finding in check(path))
 
 
-def test_an_array_of_another_shape_is_refused_by_its_path(tmp_path: Path):
+def test_an_array_of_another_shape_is_refused_by_its_path(tmp_path):
     wrong = make_stress_profile(1.0, x=np.zeros(5))
     make_stress(profiles=(wrong,)).save(tmp_path / "a.h5")
     with pytest.raises(FormatError, match=r"profile_1/x has shape \(5,\), but its axes give"):
@@ -173,7 +173,7 @@ def test_an_array_of_another_shape_is_refused_by_its_path(tmp_path: Path):
 
 
 @pytest.mark.parametrize("wrong", [np.ones(5), np.full(7, np.nan), np.ones((7, 0)), np.ones(())])
-def test_a_root_of_another_shape_or_not_finite_is_refused_by_its_path(path: Path, wrong):
+def test_a_root_of_another_shape_or_not_finite_is_refused_by_its_path(path, wrong):
     with h5py.File(path, "r+") as file:
         del file["entry/roots/profile_1/root_noise"]
         file["entry/roots/profile_1/root_noise"] = wrong
@@ -183,7 +183,7 @@ def test_a_root_of_another_shape_or_not_finite_is_refused_by_its_path(path: Path
 
 
 @pytest.mark.parametrize("factor", [-1.0, 1e200, np.nan])
-def test_a_covariance_of_an_older_file_must_be_one(old: Path, factor: float):
+def test_a_covariance_of_an_older_file_must_be_one(old, factor):
     with h5py.File(old, "r+") as file:
         stored = file["entry/profile_1/covariance_noise"]
         stored[0, 1:] = factor * np.abs(stored[0, 0]) * (1 + np.arange(stored.shape[0] - 1))
@@ -191,7 +191,7 @@ def test_a_covariance_of_an_older_file_must_be_one(old: Path, factor: float):
         read_stress(old, accept_altered=True)
 
 
-def test_covariances_beside_the_profiles_are_read_like_those_within(old: Path):
+def test_covariances_beside_the_profiles_are_read_like_those_within(old):
     [within] = memscal.read_stress(old).profiles
     with h5py.File(old, "r+") as file:
         expected = file["entry/profile_1/covariance"][()]
@@ -204,7 +204,7 @@ def test_covariances_beside_the_profiles_are_read_like_those_within(old: Path):
         np.testing.assert_allclose(profile.covariance, expected, rtol=0, atol=close)
 
 
-def test_what_could_not_be_read_again_is_not_written(tmp_path: Path, monkeypatch):
+def test_what_could_not_be_read_again_is_not_written(tmp_path, monkeypatch):
     monkeypatch.setattr(limits, "MOST_HDF5_BYTES", 2**16)
     with pytest.raises(InputError, match=r"bytes, but at most 65,536 are taken(.|\n)*fewer"):
         make_stress().save(tmp_path / "a.h5")

@@ -36,7 +36,7 @@ def rows(*columns: Any, header: str, separator: str = ",") -> str:
     return "\n".join([header, *lines])
 
 
-def test_a_line_keeps_its_uneven_unsorted_positions(tmp_path: Path):
+def test_a_line_keeps_its_uneven_unsorted_positions(tmp_path):
     found = scan_table(tmp_path, "x,u\n1.5,2\n-1,1\n0.25,3\n")
     assert found.kind == "line"
     assert found.x.tolist() == [1.5e-3, -1e-3, 0.25e-3]
@@ -52,7 +52,7 @@ def test_a_line_keeps_its_uneven_unsorted_positions(tmp_path: Path):
     ],
     ids=["forth and back", "mixed"],
 )
-def test_repeats_over_the_same_positions_become_rows(tmp_path: Path, text):
+def test_repeats_over_the_same_positions_become_rows(tmp_path, text):
     found = scan_table(tmp_path, text, repeat="n")
     assert found.kind == "repeats"
     assert found.x.tolist() == [0.0, 1e-3, 3e-3]
@@ -71,7 +71,7 @@ def test_repeats_over_the_same_positions_become_rows(tmp_path: Path, text):
     ],
     ids=["scattered positions", "a row that is missing", "a position read twice"],
 )
-def test_other_repeats_are_points_as_they_stand_in_the_table(tmp_path: Path, text):
+def test_other_repeats_are_points_as_they_stand_in_the_table(tmp_path, text):
     found = scan_table(tmp_path, text, repeat="n")
     stated = np.loadtxt(text.splitlines(), delimiter=",", skiprows=1)
     assert found.kind == "points"
@@ -81,7 +81,7 @@ def test_other_repeats_are_points_as_they_stand_in_the_table(tmp_path: Path, tex
     assert any("in 2 repeats at 3 places" in note.text for note in found.messages)
 
 
-def test_a_raster_is_points_and_its_places_and_steps_are_named(tmp_path: Path):
+def test_a_raster_is_points_and_its_places_and_steps_are_named(tmp_path):
     """In random order, with three places missing and scattered positions."""
     rng = np.random.default_rng(3)
     place = rng.permutation(np.setdiff1d(np.arange(35), [4, 17, 30]))
@@ -142,7 +142,7 @@ NO_UNITS = {"x_unit": None, "u_unit": None}
         (f"x/mm,u (mV),u (V)\n{LINE}", NO_UNITS, r"columns 'u': u \(mV\), u \(V\)"),
     ],
 )
-def test_a_table_of_no_use_is_refused(tmp_path: Path, text, options, words):
+def test_a_table_of_no_use_is_refused(tmp_path, text, options, words):
     with pytest.raises(InputError, match=words):
         scan_table(tmp_path, text, **options)
 
@@ -159,7 +159,7 @@ def test_a_table_of_no_use_is_refused(tmp_path: Path, text, options, words):
     ],
 )
 @pytest.mark.parametrize("head", ["u/{}", "u ({})", "u[{}]"])
-def test_readings_of_any_unit_state_it_in_their_head(tmp_path: Path, unit, si, factor, head):
+def test_readings_of_any_unit_state_it_in_their_head(tmp_path, unit, si, factor, head):
     text = f"x,{head.format(unit)}\n0,1\n1,2\n"
     found = scan_table(tmp_path, text, u_unit=None, film=None, indenter=None, load=None)
     assert found.unit == si
@@ -167,7 +167,7 @@ def test_readings_of_any_unit_state_it_in_their_head(tmp_path: Path, unit, si, f
     assert (found.film, found.indenter, found.load) == (None, None, None)
 
 
-def test_the_load_comes_from_the_option_or_the_median_of_its_column(tmp_path: Path):
+def test_the_load_comes_from_the_option_or_the_median_of_its_column(tmp_path):
     text = "x,u,f\n0,1,990\n1,2,1000\n2,2,1030\n"
     found = scan_table(tmp_path, text, load=None, load_column="f", load_unit="mN")
     assert found.load == 1.0
@@ -177,7 +177,7 @@ def test_the_load_comes_from_the_option_or_the_median_of_its_column(tmp_path: Pa
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_a_line_at_several_loads_is_numbered_by_them(tmp_path: Path, seed):
+def test_a_line_at_several_loads_is_numbered_by_them(tmp_path, seed):
     rng = np.random.default_rng(seed)
     loads = rng.permutation(np.repeat([0.02, 0.05, 0.1], 11)) * rng.normal(1, 0.01, 33)
     x = np.tile(np.arange(11.0), 3)
@@ -190,7 +190,7 @@ def test_a_line_at_several_loads_is_numbered_by_them(tmp_path: Path, seed):
     assert not one.passes.any()
 
 
-def test_rows_without_a_position_are_left_out_and_named_and_a_header_may_be(tmp_path: Path):
+def test_rows_without_a_position_are_left_out_and_named_and_a_header_may_be(tmp_path):
     found = scan_table(tmp_path, "0,9,1\n,7,7\n1,8,\n", x="1", u=3)
     np.testing.assert_array_equal(found.u_zz, [1e-3, np.nan])
     assert any("they have no position: line" in note.text for note in found.messages)
@@ -214,7 +214,7 @@ def test_rows_without_a_position_are_left_out_and_named_and_a_header_may_be(tmp_
         ('a,b,c\n"2 m/s","",""\nt,x,u\ns,mm,mV\n0,.5,1.25\n1,1.5,2.5\n', {"x_unit": None}),
     ],
 )
-def test_every_dialect_gives_the_same_numbers(tmp_path: Path, text, options):
+def test_every_dialect_gives_the_same_numbers(tmp_path, text, options):
     found = scan_table(tmp_path, text, film=None, **options)
     assert found.x.tolist() == [0.5e-3, 1.5e-3]
     assert found.u_zz.tolist() == [1.25e-3, 2.5e-3]
@@ -228,7 +228,7 @@ EXPORT = (
 
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "utf-16-be", "cp1252"])
 @pytest.mark.parametrize("ends", ["\n", "\r\n", "\r"])
-def test_an_export_with_preamble_and_units_is_read_as_it_is(tmp_path: Path, encoding, ends):
+def test_an_export_with_preamble_and_units_is_read_as_it_is(tmp_path, encoding, ends):
     content = EXPORT.replace("\n", ends).encode(encoding)
     mark = b"\xfe\xff" if encoding == "utf-16-be" else b""
     (tmp_path / "t.csv").write_bytes(mark + content)
@@ -249,7 +249,7 @@ def test_an_export_with_preamble_and_units_is_read_as_it_is(tmp_path: Path, enco
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_wrong_cells_are_counted_and_the_first_five_named_by_their_lines(tmp_path: Path, seed):
+def test_wrong_cells_are_counted_and_the_first_five_named_by_their_lines(tmp_path, seed):
     """Wherever they stand, the first row of numbers included, and in blocks read in either way."""
     rng = np.random.default_rng(seed)
     lines = [f"{i},{i}" for i in range(40_000)]
@@ -265,13 +265,13 @@ def test_wrong_cells_are_counted_and_the_first_five_named_by_their_lines(tmp_pat
         scan_table(tmp_path, text, film=None)
 
 
-def test_the_same_unit_in_other_letters_does_not_contradict(tmp_path: Path):
+def test_the_same_unit_in_other_letters_does_not_contradict(tmp_path):
     text = "x (µm),u [millivolt]\n0,1\n1e3,2\n2e3,1\n"
     scan = scan_table(tmp_path, text, x_unit="um")
     np.testing.assert_allclose(scan.x, [0, 1e-3, 2e-3])
 
 
-def test_uncertainties_are_a_column_or_one_number_in_the_unit_of_the_readings(tmp_path: Path):
+def test_uncertainties_are_a_column_or_one_number_in_the_unit_of_the_readings(tmp_path):
     text = "x,u,e [uV]\n0,1,30\n1,2,40\n2,1,50\n"
     column = scan_table(tmp_path, text, u_errors="e")
     np.testing.assert_allclose(column.u_zz_errors, [3e-5, 4e-5, 5e-5])
@@ -287,7 +287,7 @@ def test_uncertainties_are_a_column_or_one_number_in_the_unit_of_the_readings(tm
         ({"x": None, "y": "a"}, "y"),
     ],
 )
-def test_a_line_of_two_columns_runs_along_the_one_that_spreads(tmp_path: Path, options, direction):
+def test_a_line_of_two_columns_runs_along_the_one_that_spreads(tmp_path, options, direction):
     scan = scan_table(tmp_path, "a,b,u\n-2,5.001,1\n0,5,2\n3,4.999,1\n", **options)
     assert (scan.kind, scan.direction) == ("line", direction)
     np.testing.assert_allclose(scan.x, [-2e-3, 0, 3e-3])
@@ -314,7 +314,7 @@ def reference_table(path: Path, text: str, **options: Any) -> Any:
     return read_reference_table(table, **given)
 
 
-def test_a_fem_table_is_sorted_and_converted_and_its_force_reported(tmp_path: Path):
+def test_a_fem_table_is_sorted_and_converted_and_its_force_reported(tmp_path):
     r = np.linspace(0, 8, 401)
     s = np.exp(-(r**2) / 2) / (2 * np.pi)  # 1 N with r in mm and s in MPa
     order = np.random.default_rng(1).permutation(r.size)
@@ -336,18 +336,18 @@ def test_a_fem_table_is_sorted_and_converted_and_its_force_reported(tmp_path: Pa
     ("r,s\n0,2\n1,1\n", {"load": 3.0, "sign": 0}, "Give 1 or -1"),
     ("r,s\n0,2\n1,1\n", {"load": 3.0, "shear_sign": 0}, "Give 1 or -1"),
 ])  # fmt: skip
-def test_a_fem_table_that_cannot_be_used_is_refused(tmp_path: Path, text, options, words):
+def test_a_fem_table_that_cannot_be_used_is_refused(tmp_path, text, options, words):
     with pytest.raises(InputError, match=words):
         reference_table(tmp_path, text, **options)
 
 
-def test_nodes_given_twice_are_averaged_and_reported(tmp_path: Path):
+def test_nodes_given_twice_are_averaged_and_reported(tmp_path):
     found = reference_table(tmp_path, "r,s\n0,2\n1,1.1\n1,0.9\n2,0.1\n", load=7.0)
     assert found.profile.sigma_zz.tolist() == [2e6, 1e6, 0.1e6]
     assert any("1 rows repeat" in note.text and "0.05" in note.text for note in found.notes)
 
 
-def test_the_shear_sign_turns_the_stress_component_into_the_traction_on_the_film(tmp_path: Path):
+def test_the_shear_sign_turns_the_stress_component_into_the_traction_on_the_film(tmp_path):
     """Traction is stress times normal; the film's lower face has the normal -z."""
     shear = 0.3
     table = f"r,s,t\n0,-2,0\n1,-1,{shear}\n"
@@ -368,7 +368,7 @@ def gaussian_table(reach: float, factor: float = 1.0) -> str:
     return rows(r.tolist(), s.tolist(), header="r,s")
 
 
-def test_the_force_of_a_table_is_as_good_as_its_radii(tmp_path: Path):
+def test_the_force_of_a_table_is_as_good_as_its_radii(tmp_path):
     found = reference_table(tmp_path, gaussian_table(8.0))
     assert found.profile.force == pytest.approx(1.0, abs=1e-6)
     assert not any(note.severity == "warning" for note in found.notes)
@@ -376,12 +376,12 @@ def test_the_force_of_a_table_is_as_good_as_its_radii(tmp_path: Path):
 
 
 @pytest.mark.parametrize("factor", [1e-6, 1e-3, 0.4, 2.5, 1e3])
-def test_a_force_far_from_the_load_is_refused_as_a_wrong_unit(tmp_path: Path, factor):
+def test_a_force_far_from_the_load_is_refused_as_a_wrong_unit(tmp_path, factor):
     with pytest.raises(InputError, match=r"times the load(.|\n)*\"MPa\"(.|\n)*\"mm\"(.|\n)*sign"):
         reference_table(tmp_path, gaussian_table(8.0, factor))
 
 
-def test_a_table_that_ends_early_is_warned_of_and_not_refused(tmp_path: Path):
+def test_a_table_that_ends_early_is_warned_of_and_not_refused(tmp_path):
     """Within one standard deviation a Gaussian carries 1 - exp(-1/2) of its force."""
     found = reference_table(tmp_path, gaussian_table(1.0))
     assert found.profile.force == pytest.approx(1 - np.exp(-0.5), rel=1e-6)
@@ -391,14 +391,14 @@ def test_a_table_that_ends_early_is_warned_of_and_not_refused(tmp_path: Path):
         reference_table(tmp_path, gaussian_table(1.0), load=0.1)
 
 
-def test_a_voltage_that_falls_under_compression_can_be_turned(tmp_path: Path):
+def test_a_voltage_that_falls_under_compression_can_be_turned(tmp_path):
     found = scan_table(tmp_path, "x,u,s\n0,-1,5\n1,-2,6\n", u_sign=-1, u_xz="s")
     assert found.u_zz.tolist() == [1e-3, 2e-3]
     assert found.channels["u_xz"].tolist() == [5e-3, 6e-3]
     assert "The sign of u_zz was changed." in found.notes
 
 
-def test_what_the_table_says_at_its_head_travels_with_the_scan(tmp_path: Path):
+def test_what_the_table_says_at_its_head_travels_with_the_scan(tmp_path):
     head = "# SYNTHETIC: made up\x1b[2J\n%  rod 3\n#\n" + "# " + "z" * 5000 + "\n" + "# more\n" * 40
     found = scan_table(tmp_path, head + "x,u\n0,1\n# within the table\n1,2\n")
     lines = found.notes.splitlines()
@@ -411,7 +411,7 @@ def test_what_the_table_says_at_its_head_travels_with_the_scan(tmp_path: Path):
     assert max(map(len, lines)) < 400
 
 
-def test_an_error_of_a_spreadsheet_is_a_cell_and_a_comment_among_rows_is_told(tmp_path: Path):
+def test_an_error_of_a_spreadsheet_is_a_cell_and_a_comment_among_rows_is_told(tmp_path):
     errors = "t,x,u\n" + "\n".join(f"{'#N/A' if x % 2 else x},{x},1" for x in range(9))
     assert scan_table(tmp_path, errors).x.size == 9
     found = scan_table(tmp_path, "x,u\n0,1\n1,2\n#2,3\n3,4\n4,5\n")
@@ -420,7 +420,7 @@ def test_an_error_of_a_spreadsheet_is_a_cell_and_a_comment_among_rows_is_told(tm
 
 
 @pytest.mark.parametrize(("apex", "lowest"), [(0.0, 0.0), (3.0, 3.0), (0.4, 0.5), (6.0, 6.0)])
-def test_a_tip_that_is_lowest_away_from_its_axis_is_warned_of(tmp_path: Path, apex, lowest):
+def test_a_tip_that_is_lowest_away_from_its_axis_is_warned_of(tmp_path, apex, lowest):
     r = np.arange(0.0, 6.5, 0.5)
     table = tmp_path / "tip.csv"
     table.write_text(rows(*map(np.ndarray.tolist, (r, 5 * (r - apex) ** 2)), header="r,z"))
@@ -507,7 +507,7 @@ def test_dead_rows_at_the_edge_of_a_raster_are_left_out_and_named(dead, left, pl
     assert ("rows of zeros" in found.notes) is bool(left)
 
 
-def test_a_typographic_minus_is_one_and_d_begins_a_power_of_ten(tmp_path: Path):
+def test_a_typographic_minus_is_one_and_d_begins_a_power_of_ten(tmp_path):
     found = scan_table(tmp_path, "x,u\n−1,1\n0,1D5\n1,2\n2,3\n", missing=["1d5"])
     assert found.x[0] == -1e-3
     assert np.isnan(found.u_zz).sum() == 1

@@ -59,9 +59,7 @@ def normal() -> Build:
     ],
     ids=["incremental", "total", "shear", "elasto-plastic", "exponential"],
 )
-def test_interpolated_profiles_are_those_of_contacts_solved_between(
-    build, loads, grid, between
-) -> None:
+def test_interpolated_profiles_are_those_of_contacts_solved_between(build, loads, grid, between):
     family = build(FILM, SPHERE, list(loads), list(grid))
     solved = build(FILM, SPHERE, list(loads), between)
     for index, value in enumerate(between):
@@ -74,7 +72,7 @@ def test_interpolated_profiles_are_those_of_contacts_solved_between(
     ("friction", "loading", "order"),
     [(0.2, "incremental", 0), (math.inf, "total", 0), (0.2, "incremental", 1)],
 )
-def test_a_family_holds_the_contacts_that_indent_finds(friction, loading, order) -> None:
+def test_a_family_holds_the_contacts_that_indent_finds(friction, loading, order):
     family = amontons(loading=loading, order=order)(FILM, SPHERE, list(LOADS), [friction])
     assert family.order == order
     spectrum = ("base_spectrum", "base_shear_spectrum")[order]
@@ -118,7 +116,7 @@ BY_DAY = [pytest.param(case, marks=FULL if case in ("smooth", "total") else ()) 
 
 
 @pytest.mark.parametrize("case", BY_DAY)
-def test_sensitivities_are_the_differences_of_contacts_with_other_properties(case: str) -> None:
+def test_sensitivities_are_the_differences_of_contacts_with_other_properties(case):
     build, grid, value = CASES[case]
     load = 1.37
     step = 0.002
@@ -145,7 +143,7 @@ def test_sensitivities_are_the_differences_of_contacts_with_other_properties(cas
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_derivatives_by_the_load_are_those_of_nearer_neighbours(case: str) -> None:
+def test_derivatives_by_the_load_are_those_of_nearer_neighbours(case):
     build, _, value = CASES[case]
     load = 1.37
     step = 0.005
@@ -155,7 +153,7 @@ def test_derivatives_by_the_load_are_those_of_nearer_neighbours(case: str) -> No
     assert apart(family, family.by_load[0], truth) < 0.01
 
 
-def test_whatever_changes_the_base_still_bears_the_load() -> None:
+def test_whatever_changes_the_base_still_bears_the_load():
     family = amontons_family(UNCERTAIN_FILM, UNCERTAIN_SPHERE, LOADS, friction=[0.2], reach=REACH)
     squared = family.wavenumbers.k[:3] ** 2
 
@@ -168,13 +166,13 @@ def test_whatever_changes_the_base_still_bears_the_load() -> None:
         assert np.max(np.abs(force(change[0]))) < 1e-6, source
 
 
-def test_only_stated_uncertainties_count() -> None:
+def test_only_stated_uncertainties_count():
     film = replace(FILM, thickness_uncertainty=2e-5, poisson_ratio_uncertainty=0.0)
     family = amontons_family(film, SPHERE, [0.34], friction=[0.0], reach=REACH)
     assert set(family.changes) == {"thickness"}
 
 
-def test_a_slip_length_of_nothing_is_rigid_and_one_without_end_is_smooth() -> None:
+def test_a_slip_length_of_nothing_is_rigid_and_one_without_end_is_smooth():
     family = elasto_plastic_family(
         FILM, SPHERE, LOADS[:1], friction=0.3, slip_lengths=[0, math.inf], reach=REACH
     )
@@ -183,7 +181,7 @@ def test_a_slip_length_of_nothing_is_rigid_and_one_without_end_is_smooth() -> No
     assert_same_to_rounding(family.spectra[1], rigid.spectra[0])
 
 
-def test_the_pressure_at_which_mean_planes_meet_does_not_reach_the_base() -> None:
+def test_the_pressure_at_which_mean_planes_meet_does_not_reach_the_base():
     # p1 exp(-d / l) with another p1 is the same law at another distance: only the depth shifts.
     family = normal_compliance_family(FILM, SPHERE, LOADS[:1], lengths=[4e-6], reach=REACH)
     for meeting in (1e2, 3e4):
@@ -193,7 +191,7 @@ def test_the_pressure_at_which_mean_planes_meet_does_not_reach_the_base() -> Non
         assert apart(family, family.spectra[0], truth) < 3e-4
 
 
-def test_the_rough_film_scales_the_usual_lengths(monkeypatch) -> None:
+def test_the_rough_film_scales_the_usual_lengths(monkeypatch):
     monkeypatch.setattr(FamilySetup, "family", lambda _, paths, **laws: (paths, laws["values"]))
     rough = replace(FILM, roughness_rms=1e-6)
     paths, lengths = normal_compliance_family(rough, SPHERE, [0.34], reach=REACH)
@@ -201,7 +199,7 @@ def test_the_rough_film_scales_the_usual_lengths(monkeypatch) -> None:
     assert lengths[-1] == paths[-1].interface.normal.decay_length == pytest.approx(8e-6)
 
 
-def test_loads_may_come_in_any_order_and_share_their_neighbours() -> None:
+def test_loads_may_come_in_any_order_and_share_their_neighbours():
     asked = [0.7, 0.34, 0.69]
     family = amontons_family(FILM, SPHERE, asked, friction=[0.25], reach=REACH)
     upward = amontons_family(FILM, SPHERE, sorted(asked), friction=[0.25], reach=REACH)
@@ -209,7 +207,7 @@ def test_loads_may_come_in_any_order_and_share_their_neighbours() -> None:
     assert family.loads.tolist() == asked
 
 
-def test_a_load_beyond_the_model_is_named() -> None:
+def test_a_load_beyond_the_model_is_named():
     with pytest.raises(DomainError, match=r"up to 300 N .*friction 0\.1"):
         amontons_family(FILM, Sphere(radius=2e-3), [1.0, 300.0], friction=[0.1], reach=REACH)
 
@@ -221,14 +219,14 @@ def test_a_load_beyond_the_model_is_named() -> None:
     ({"friction": []}, "none of them negative"), ({"loading": "sudden"}, "loading is 'sudden'"),
     ({"reach": 0.0}, "reach"), ({"workers": 0}, "workers"),
 ])  # fmt: skip
-def test_a_request_that_makes_no_sense_is_refused(changed: dict[str, object], said: str) -> None:
+def test_a_request_that_makes_no_sense_is_refused(changed, said):
     request = {"indenter": SPHERE, "loads": [0.34], "friction": [0.1], "reach": REACH} | changed
     film_indenter_loads = FILM, request.pop("indenter"), request.pop("loads")
     with pytest.raises(InputError, match=said):
         amontons_family(*film_indenter_loads, **request)
 
 
-def test_laws_without_meaning_are_refused() -> None:
+def test_laws_without_meaning_are_refused():
     for friction in (0.0, math.inf, -1.0):
         with pytest.raises(InputError, match="macroscopic"):
             elasto_plastic_family(FILM, SPHERE, [0.34], friction=friction, reach=REACH)

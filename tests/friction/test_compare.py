@@ -66,7 +66,7 @@ def failed(found: memscal.FrictionComparison) -> set[str]:
     return {check.name for check in found.checks if not check.passed}
 
 
-def test_what_is_calculated_is_the_contact_blurred_by_g(found, apparatus, made) -> None:
+def test_what_is_calculated_is_the_contact_blurred_by_g(found, apparatus, made):
     one = found.loads["incremental"][1]
     r = np.linspace(0.0, 30e-3, 1200)
     contact = memscal.indent(made.dry.film.expected, made.dry.indenter, load=2.75, friction=0.3)
@@ -78,7 +78,7 @@ def test_what_is_calculated_is_the_contact_blurred_by_g(found, apparatus, made) 
     assert one.ratio == pytest.approx(one.s_max / one.p0_max)
 
 
-def test_chi_square_of_the_calculated_profiles_is_that_of_the_likelihood(found) -> None:
+def test_chi_square_of_the_calculated_profiles_is_that_of_the_likelihood(found):
     for one in found.loads["incremental"]:
         assert one.chi_square.shape == one.p_values.shape == (len(FRICTION),)
         assert one.deviance.min() >= 0
@@ -88,7 +88,7 @@ def test_chi_square_of_the_calculated_profiles_is_that_of_the_likelihood(found) 
         assert along[where] - along.min() == pytest.approx(one.deviance)
 
 
-def test_a_stress_beyond_full_stick_fails_checks(made, apparatus, families) -> None:
+def test_a_stress_beyond_full_stick_fails_checks(made, apparatus, families):
     """A gain of 30 % that the rod scan did not have."""
     wrong = [scaled(scan, 1.3) for scan in (made.dry, made.lubricated)]
     measured = memscal.measure_stress(wrong, apparatus)
@@ -97,7 +97,7 @@ def test_a_stress_beyond_full_stick_fails_checks(made, apparatus, families) -> N
     assert found.joint["dry"]["incremental"].value is None
 
 
-def test_noise_that_is_understated_fails_the_chi_square(made, apparatus, families) -> None:
+def test_noise_that_is_understated_fails_the_chi_square(made, apparatus, families):
     wrong = scaled(made.dry, 1.0, noise=0.25)
     found = compare_measured(memscal.measure_stress(wrong, apparatus), apparatus, families)
     assert "joint_chi_square_dry" in failed(found)
@@ -123,7 +123,7 @@ def on_another_film(made: Experiment) -> list[Scan]:
         (on_another_film, "another film or sphere"),
     ],
 )
-def test_scans_that_cannot_be_compared_are_refused(made, apparatus, scans, words) -> None:
+def test_scans_that_cannot_be_compared_are_refused(made, apparatus, scans, words):
     with pytest.raises(InputError, match=words):
         memscal.compare(scans(made), apparatus)
 
@@ -139,12 +139,12 @@ def test_scans_that_cannot_be_compared_are_refused(made, apparatus, scans, words
         ({"macroscopic": -0.1}, "macroscopic"),
     ],
 )
-def test_options_that_make_no_sense_are_refused(made, apparatus, options, words) -> None:
+def test_options_that_make_no_sense_are_refused(made, apparatus, options, words):
     with pytest.raises(InputError, match=words):
         memscal.compare(made.lubricated, apparatus, **options)
 
 
-def test_lubricated_loads_are_fitted_beside_the_dry_ones(made, apparatus, families, found) -> None:
+def test_lubricated_loads_are_fitted_beside_the_dry_ones(made, apparatus, families, found):
     measured = memscal.measure_stress([made.dry, made.lubricated], apparatus)
     by = [
         compare_measured(measured, apparatus, families, lubricated_friction=width)
@@ -167,7 +167,7 @@ def test_lubricated_loads_are_fitted_beside_the_dry_ones(made, apparatus, famili
 
 def test_how_far_lubricated_friction_moves_the_dry_coefficient(
     made, apparatus, families, monkeypatch
-) -> None:
+):
     measured = memscal.measure_stress([made.dry, made.lubricated], apparatus)
 
     def estimate(at: float) -> memscal.BoundedEstimate:
@@ -186,7 +186,7 @@ def test_how_far_lubricated_friction_moves_the_dry_coefficient(
     assert none.by_lubricated == pytest.approx(-change, rel=0.2)
 
 
-def test_what_passes_the_check_moves_the_dry_coefficient_by_one_uncertainty(found) -> None:
+def test_what_passes_the_check_moves_the_dry_coefficient_by_one_uncertainty(found):
     limit = next(one.limit for one in found.checks if one.name == "lubricated_frictionless")
     moved = []
     for loading, dry in found.joint["dry"].items():
@@ -196,7 +196,7 @@ def test_what_passes_the_check_moves_the_dry_coefficient_by_one_uncertainty(foun
     assert max(moved) == pytest.approx(1.0)
 
 
-def test_a_failed_check_leaves_the_fit_as_it_is(made, apparatus, families) -> None:
+def test_a_failed_check_leaves_the_fit_as_it_is(made, apparatus, families):
     wrong = [made.dry, replace(made.dry, lubrication="lubricated")]
     refused = memscal.measure_stress(wrong, apparatus)
     chosen = compare_measured(refused, apparatus, families)
@@ -208,7 +208,7 @@ def test_a_failed_check_leaves_the_fit_as_it_is(made, apparatus, families) -> No
         memscal.compare(refused, apparatus, lubricated="apart", lubricated_friction=0.03)
 
 
-def test_a_budget_adds_up_to_its_total(made, apparatus) -> None:
+def test_a_budget_adds_up_to_its_total(made, apparatus):
     found = memscal.compare([made.dry, made.lubricated], apparatus, friction=FRICTION)
     joint = found.joint["dry"]
     loads = [one.by_profile for loads in found.loads.values() for one in loads]
@@ -219,7 +219,7 @@ def test_a_budget_adds_up_to_its_total(made, apparatus) -> None:
     assert "loading" in joint["total"].budget
 
 
-def test_each_scan_has_a_gain_of_its_own(made, apparatus, families) -> None:
+def test_each_scan_has_a_gain_of_its_own(made, apparatus, families):
     scans = [made.dry, made.lubricated, scaled(made.dry, 1.01)]
     measured = memscal.measure_stress(scans, apparatus)
     points = points_of(measured.profiles)
@@ -233,7 +233,7 @@ def test_each_scan_has_a_gain_of_its_own(made, apparatus, families) -> None:
     assert column["load"].shape[-1] == 3
 
 
-def test_a_noise_that_was_estimated_has_no_chi_square(made, apparatus, families) -> None:
+def test_a_noise_that_was_estimated_has_no_chi_square(made, apparatus, families):
     scans = [replace(scan, u_zz_errors=None) for scan in (made.dry, made.lubricated)]
     found = compare_measured(memscal.measure_stress(scans, apparatus), apparatus, families)
     assert not found.measured.noise_stated
@@ -242,9 +242,7 @@ def test_a_noise_that_was_estimated_has_no_chi_square(made, apparatus, families)
     assert not {name for name in names if "chi_square" in name}
 
 
-def test_an_error_of_the_film_that_sensor_and_contact_share_counts_once(
-    made, apparatus, families
-) -> None:
+def test_an_error_of_the_film_that_sensor_and_contact_share_counts_once(made, apparatus, families):
     # A film that is thicker than stated: the calibration's A G and the contacts err together.
     family = families["incremental"]
     film = made.dry.film

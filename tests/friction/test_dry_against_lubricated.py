@@ -67,31 +67,31 @@ def every(friction: float, **options: float) -> list[DryAgainstLubricated]:
 @pytest.mark.parametrize(
     "options", [{}, {"correlation": 0.6}, {"shift": 0.1e-3}], ids=["plain", "correlated", "shifted"]
 )
-def test_two_frictionless_scans_differ_by_chance(options: dict[str, float]) -> None:
+def test_two_frictionless_scans_differ_by_chance(options):
     found = every(0.0, **options)
     assert len(found) == PAIRS
     assert kstest([one.p_value for one in found], "uniform").pvalue > CHANCE
     assert all(one.degrees == 33 - 3 for one in found)
 
 
-def test_friction_shows() -> None:
+def test_friction_shows():
     found = every(0.2)
     assert np.mean([one.p_value < 1e-3 for one in found]) > 0.9
     assert np.mean([one.maximum for one in found]) > 0
 
 
-def test_an_error_of_the_conversion_constant_scales_the_difference_alone() -> None:
+def test_an_error_of_the_conversion_constant_scales_the_difference_alone():
     one = compared(0.2, 1)
     noise = np.sqrt(2) * bare_points().noise[0] / CONVERSION
     assert one.difference_errors == pytest.approx(np.hypot(noise, 0.01 * one.difference))
     assert one.maximum_uncertainty == pytest.approx(np.hypot(0.01 * one.maximum, 100 * 2**0.5))
 
 
-def test_scans_without_common_places_are_not_compared() -> None:
+def test_scans_without_common_places_are_not_compared():
     assert compared(0.0, 1, shift=0.25e-3) is None
 
 
-def test_pairs_are_of_one_load_dry_and_lubricated() -> None:
+def test_pairs_are_of_one_load_dry_and_lubricated():
     points = bare_points()
     profiles = [
         profile(points, "dry", 0.5),

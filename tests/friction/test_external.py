@@ -3,7 +3,6 @@
 import math
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -30,7 +29,7 @@ def tables() -> list[StressProfile]:
     ]
 
 
-def test_tables_of_our_own_contacts_give_our_own_family(tmp_path: Path) -> None:
+def test_tables_of_our_own_contacts_give_our_own_family(tmp_path):
     ours = amontons_family(FILM, SPHERE, LOADS, friction=FRICTIONS, reach=REACH, cache=tmp_path)
     family = external_family(tables(), LOADS, **CONTACT, cache=tmp_path)
     assert family.name == "external"
@@ -43,7 +42,7 @@ def test_tables_of_our_own_contacts_give_our_own_family(tmp_path: Path) -> None:
     np.testing.assert_allclose(family.depths, ours.depths, rtol=1e-3)
 
 
-def test_a_table_serves_a_load_within_one_percent_in_proportion(tmp_path: Path) -> None:
+def test_a_table_serves_a_load_within_one_percent_in_proportion(tmp_path):
     asked = [load * 1.008 for load in LOADS]
     exact = external_family(tables(), LOADS, **CONTACT, cache=tmp_path)
     family = external_family(tables(), asked, **CONTACT, cache=tmp_path)
@@ -53,7 +52,7 @@ def test_a_table_serves_a_load_within_one_percent_in_proportion(tmp_path: Path) 
     assert_same_to_rounding(turned.spectra, family.spectra)
 
 
-def test_every_missing_table_is_named() -> None:
+def test_every_missing_table_is_named():
     given = [one for one in tables() if (one.load, one.friction_coefficient) != (2.75, 0.3)]
     with pytest.raises(InputError, match=r"No table was given for 2\.75 N with friction 0\.3\."):
         external_family(given, LOADS, **CONTACT)
@@ -61,7 +60,7 @@ def test_every_missing_table_is_named() -> None:
         external_family(tables(), [0.34, 1.0], **CONTACT)
 
 
-def test_tables_that_contradict_each_other_are_refused() -> None:
+def test_tables_that_contradict_each_other_are_refused():
     with pytest.raises(InputError, match="both for"):
         external_family([*tables(), tables()[0]], LOADS, **CONTACT)
     with pytest.raises(InputError, match="one loading"):
@@ -70,7 +69,7 @@ def test_tables_that_contradict_each_other_are_refused() -> None:
         external_family([], LOADS, **CONTACT)
 
 
-def test_a_table_that_cannot_be_compared_is_refused() -> None:
+def test_a_table_that_cannot_be_compared_is_refused():
     one = tables()[0]
     short = one.r < 2e-3
     for changed, said in (

@@ -42,14 +42,14 @@ def family() -> ProfileFamily:
 
 
 @pytest.mark.parametrize("value", [0.0, 1e-3, 0.3, 7.0, math.inf])
-def test_value_and_bounded_coordinate_are_inverse_to_each_other(value: float) -> None:
+def test_value_and_bounded_coordinate_are_inverse_to_each_other(value):
     coordinate = bounded(value, 0.3)
     assert 0 <= coordinate <= 1
     assert unbounded(coordinate, 0.3) == pytest.approx(value, rel=1e-12)
 
 
 @pytest.mark.parametrize("index", range(VALUES.size))
-def test_at_a_value_of_its_own_a_family_gives_that_member(index: int) -> None:
+def test_at_a_value_of_its_own_a_family_gives_that_member(index):
     one = family()
     member = one.at(float(VALUES[index]))
     np.testing.assert_allclose(member.spectra[0], one.spectra[index], rtol=1e-14)
@@ -59,14 +59,14 @@ def test_at_a_value_of_its_own_a_family_gives_that_member(index: int) -> None:
     )
 
 
-def test_between_its_values_a_family_that_rises_never_falls() -> None:
+def test_between_its_values_a_family_that_rises_never_falls():
     one = family()
     passed = np.array([one.at(unbounded(t, 0.3)).spectra[0, 0, 0] for t in np.linspace(0, 1, 101)])
     assert np.all(np.diff(passed) >= -1e-15)
     assert passed[-1] == pytest.approx(one.spectra[-1, 0, 0])
 
 
-def test_a_family_is_not_extrapolated() -> None:
+def test_a_family_is_not_extrapolated():
     fields = {name: getattr(family(), name) for name in family().__dataclass_fields__}
     short = ProfileFamily(**(fields | {"values": np.array([0.05, 0.1, 0.2, 0.3, 0.4])}))
     for beyond in (0.01, 0.5, math.inf):
@@ -74,7 +74,7 @@ def test_a_family_is_not_extrapolated() -> None:
             short.at(beyond)
 
 
-def test_a_family_cannot_be_changed_and_survives_another_process() -> None:
+def test_a_family_cannot_be_changed_and_survives_another_process():
     one = family()
     with pytest.raises(ValueError, match="read-only"):
         one.spectra[0, 0, 0] = 0.0
@@ -84,6 +84,6 @@ def test_a_family_cannot_be_changed_and_survives_another_process() -> None:
 
 
 @pytest.mark.parametrize("wrong", [-0.1, math.nan])
-def test_a_value_that_is_none_is_refused(wrong: float) -> None:
+def test_a_value_that_is_none_is_refused(wrong):
     with pytest.raises(InputError, match="does not reach"):
         family().at(wrong)

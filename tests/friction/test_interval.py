@@ -31,7 +31,7 @@ def parabola(best: float, sigma: float, last: float = np.inf) -> BoundedEstimate
 
 @pytest.mark.parametrize("sigma", [0.002, 0.02, 0.1])
 @pytest.mark.parametrize("best", [0.4, 0.4037])
-def test_the_ends_of_a_parabola_are_known(best: float, sigma: float) -> None:
+def test_the_ends_of_a_parabola_are_known(best, sigma):
     found = parabola(best, sigma)
     assert found.value == pytest.approx(value_at(best), rel=1e-3)
     assert found.least == pytest.approx(7.0, abs=1e-6)
@@ -43,7 +43,7 @@ def test_the_ends_of_a_parabola_are_known(best: float, sigma: float) -> None:
     assert found.reason == ""
 
 
-def test_an_interval_that_reaches_full_stick_is_a_lower_bound() -> None:
+def test_an_interval_that_reaches_full_stick_is_a_lower_bound():
     found = parabola(0.9, 0.1)
     assert found.interval.high is None
     assert found.interval.low == pytest.approx(value_at(0.704), rel=1e-2)
@@ -54,7 +54,7 @@ def test_an_interval_that_reaches_full_stick_is_a_lower_bound() -> None:
     assert "20" in parabola(0.9, 0.1, last=20.0).reason
 
 
-def test_an_interval_that_reaches_no_friction_begins_there() -> None:
+def test_an_interval_that_reaches_no_friction_begins_there():
     found = parabola(0.05, 0.1)
     assert found.interval.low == 0
     assert found.interval.high == pytest.approx(value_at(0.246), rel=1e-2)
@@ -62,18 +62,18 @@ def test_an_interval_that_reaches_no_friction_begins_there() -> None:
     assert found.reason == ""
 
 
-def test_a_best_value_beyond_an_end_is_that_end() -> None:
+def test_a_best_value_beyond_an_end_is_that_end():
     assert parabola(-0.2, 0.1).value == 0
     assert parabola(1.2, 0.1).best == float("inf")
 
 
-def test_a_flat_likelihood_identifies_nothing() -> None:
+def test_a_flat_likelihood_identifies_nothing():
     found = parabola(0.5, 10.0)
     assert (found.interval.low, found.interval.high) == (0, None)
     assert "not identifiable" in found.reason
 
 
-def test_what_is_flat_beyond_a_value_bounds_from_below_only() -> None:
+def test_what_is_flat_beyond_a_value_bounds_from_below_only():
     """The shape of the real thing: chi-square falls to a value, and stays."""
     found = estimate(60 * np.maximum(0.5 - COORDINATES, 0) ** 2 * 100)
     assert found.interval.high is None

@@ -32,7 +32,7 @@ def solved(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     return counts
 
 
-def test_a_kept_family_is_the_calculated_one_and_is_not_calculated_again(tmp_path, solved) -> None:
+def test_a_kept_family_is_the_calculated_one_and_is_not_calculated_again(tmp_path, solved):
     film = replace(FILM, thickness_uncertainty=2e-5, poisson_ratio_uncertainty=0.01)
     first, second = (calculated(tmp_path, film) for _ in range(2))
     assert len(solved) == 1
@@ -57,7 +57,7 @@ def test_another_request_but_not_another_name_is_calculated(tmp_path, solved, ch
     assert len(solved) == count
 
 
-def test_without_a_folder_nothing_is_written(tmp_path, monkeypatch) -> None:
+def test_without_a_folder_nothing_is_written(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("HOME", str(tmp_path))
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))

@@ -58,7 +58,7 @@ def generalised(residual: np.ndarray, covariance: np.ndarray, flat: np.ndarray) 
     return float(left @ inverse @ left)
 
 
-def test_chi_square_is_that_of_generalised_least_squares(laboratory: Laboratory) -> None:
+def test_chi_square_is_that_of_generalised_least_squares(laboratory):
     found = laboratory.drawn(0.15, seed=1)
     whole = found.whole.chi_square[np.isin(found.whole.values, FRICTIONS)]
     assert whole.shape == FRICTIONS.shape
@@ -73,7 +73,7 @@ def without_the_last_reading(points: LoadPoints) -> LoadPoints:
 
 
 @pytest.mark.parametrize("complete", [True, False])
-def test_repeats_share_the_error_of_their_position(complete: bool) -> None:
+def test_repeats_share_the_error_of_their_position(complete):
     points = bare_points(repeats=3)
     points = points if complete else without_the_last_reading(points)
     found = Laboratory.of(points=points).drawn(0.15, seed=1)
@@ -84,13 +84,13 @@ def test_repeats_share_the_error_of_their_position(complete: bool) -> None:
     assert likelihood(found.channel.at(0.15)).slope_fit()[0][0] < apart.slope_fit()[0][0]
 
 
-def test_one_load_of_several_is_that_load_alone(laboratory: Laboratory) -> None:
+def test_one_load_of_several_is_that_load_alone(laboratory):
     found = laboratory.drawn(0.15, seed=2)
     alone = likelihood(found.fine.only([1]))
     assert found.whole.only([1]).chi_square == pytest.approx(alone.chi_square, rel=1e-9)
 
 
-def test_the_squares_of_the_budget_add_up_to_the_variance(laboratory: Laboratory) -> None:
+def test_the_squares_of_the_budget_add_up_to_the_variance(laboratory):
     found = laboratory.drawn(0.15, seed=3)
     there = likelihood(found.channel.at(0.15))
     budget = there.budget()
@@ -99,7 +99,7 @@ def test_the_squares_of_the_budget_add_up_to_the_variance(laboratory: Laboratory
     assert sum(part**2 for part in budget.values()) == pytest.approx(variance, rel=1e-9)
 
 
-def test_the_uncertainty_is_the_curvature_of_chi_square() -> None:
+def test_the_uncertainty_is_the_curvature_of_chi_square():
     laboratory = Laboratory.of()
     points = [
         replace(points, u=laboratory.predicted(0.15, load).signal[0])
@@ -114,7 +114,7 @@ def test_the_uncertainty_is_the_curvature_of_chi_square() -> None:
     assert curvature == pytest.approx(found.slope_fit()[0][1], rel=0.02)
 
 
-def test_baseline_drift_and_a_shift_of_the_centre_change_nothing() -> None:
+def test_baseline_drift_and_a_shift_of_the_centre_change_nothing():
     laboratory = Laboratory.of()
     found = laboratory.drawn(0.2, seed=5)
     points = found.channel.points[0]
@@ -128,7 +128,7 @@ def test_baseline_drift_and_a_shift_of_the_centre_change_nothing() -> None:
     assert np.abs(moved.chi_square - before).max() < 0.3 < np.abs(fixed - before).max()
 
 
-def test_loads_that_were_recorded_off_the_nominal_one_are_followed() -> None:
+def test_loads_that_were_recorded_off_the_nominal_one_are_followed():
     laboratory = Laboratory.of(points=replace(bare_points(), log_load=0.1 * (-1) ** np.arange(33)))
     found = laboratory.drawn(0.2, seed=6)
     ignored = [replace(points, log_load=np.zeros(33)) for points in found.channel.points]
@@ -136,7 +136,7 @@ def test_loads_that_were_recorded_off_the_nominal_one_are_followed() -> None:
     assert found.whole.chi_square.min() < 100 < wrong.chi_square.min()
 
 
-def test_a_load_that_is_held_shares_its_errors_with_the_others(laboratory: Laboratory) -> None:
+def test_a_load_that_is_held_shares_its_errors_with_the_others(laboratory):
     found = laboratory.drawn(0.15, seed=8)
     frictionless = likelihood(found.channel.only([1]).at(0.0))
     together = found.whole.only([0]).with_held(frictionless, 0.0)
@@ -167,7 +167,7 @@ def predicted_of(found: FrictionFit, value: float) -> list[Predicted]:
 
 
 @pytest.mark.parametrize("friction", [0.1, 0.2])
-def test_the_most_likely_coefficient_is_right_on_average(friction: float) -> None:
+def test_the_most_likely_coefficient_is_right_on_average(friction):
     # By chi-square alone it is half a standard deviation too large: larger noise fits better.
     laboratory = Laboratory.of()
     errors = []

@@ -69,11 +69,11 @@ def family() -> ProfileFamily:
         (LoadCell(), LoadCell(), False),
     ],
 )
-def test_load_cells_are_told_apart_by_serial_number_then_by_name(mine, theirs, same) -> None:
+def test_load_cells_are_told_apart_by_serial_number_then_by_name(mine, theirs, same):
     assert mine.same_as(theirs) == theirs.same_as(mine) == same
 
 
-def test_scans_of_two_load_cells_calibrate_a_sensor_of_none() -> None:
+def test_scans_of_two_load_cells_calibrate_a_sensor_of_none():
     for cells, named in (("KK", "K"), ("KL", "")):
         scans = [
             replace(memscal.simulate(film=FILM, seed=seed), load_cell=LoadCell(name=name))
@@ -99,7 +99,7 @@ def force_of(rod_scale: float, sphere_scale: float) -> tuple[float, float]:
     return off, abs(off) / measured.checks[0].value
 
 
-def test_a_load_cell_that_is_wrong_for_both_leaves_the_check_where_it_is() -> None:
+def test_a_load_cell_that_is_wrong_for_both_leaves_the_check_where_it_is():
     (right, u), (both, _), (one, _) = (
         force_of(*scales) for scales in ((1, 1), (1.05, 1.05), (1, 1.05))
     )
@@ -108,7 +108,7 @@ def test_a_load_cell_that_is_wrong_for_both_leaves_the_check_where_it_is() -> No
     assert u < 0.03 * LOADS[1]
 
 
-def test_the_checks_do_not_allow_for_what_cancels() -> None:
+def test_the_checks_do_not_allow_for_what_cancels():
     squares = []
     for stress, sensor in (measured(0), measured(0, OTHER)):
         values = {check.name: check.value for check in stress.checks}
@@ -127,7 +127,7 @@ def test_the_checks_do_not_allow_for_what_cancels() -> None:
         assert mine.maximum_uncertainty == pytest.approx(theirs.maximum_uncertainty, rel=1e-3)
 
 
-def test_the_force_over_load_has_the_error_that_it_states() -> None:
+def test_the_force_over_load_has_the_error_that_it_states():
     z = []
     for seed in SEEDS:
         ratio, spread = pooled_force(measured(seed)[0].profiles)
@@ -146,7 +146,7 @@ def predicted(other: LoadCell | None = None) -> Predicted:
     )
 
 
-def test_its_error_changes_a_and_the_contact_as_one() -> None:
+def test_its_error_changes_a_and_the_contact_as_one():
     one = predicted()
     two = predicted(OTHER)
     assert set(one.columns) == set(two.columns)

@@ -60,7 +60,7 @@ def predicted(stage: Equipment, gain: float | None = None, stretch: float = 1.0)
     return predict(readings, sensor, family().at(0.1), 0)
 
 
-def test_one_stage_stretches_the_calibration_and_the_contacts_alike() -> None:
+def test_one_stage_stretches_the_calibration_and_the_contacts_alike():
     one = predicted(STAGE)
     truth = predicted(STAGE, stretch=1 + SHARE).signal - one.signal
     column = one.columns["position_scale"][0, :, 0]
@@ -73,7 +73,7 @@ def test_one_stage_stretches_the_calibration_and_the_contacts_alike() -> None:
     assert sizes[0] < sizes[1]
 
 
-def test_one_gain_of_calibration_and_contacts_cancels() -> None:
+def test_one_gain_of_calibration_and_contacts_cancels():
     one = predicted(STAGE, SHARE)
     unstated = predicted(STAGE)
     signal = one.signal.max()

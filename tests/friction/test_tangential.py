@@ -80,7 +80,7 @@ def cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     return tmp_path_factory.mktemp("contacts")
 
 
-def test_what_is_predicted_has_a_side_and_slopes_of_its_own() -> None:
+def test_what_is_predicted_has_a_side_and_slopes_of_its_own():
     dry = experiment(0.1, 0).dry
     shear = calibrated(0)[1]
     film = dry.film
@@ -110,7 +110,7 @@ def test_what_is_predicted_has_a_side_and_slopes_of_its_own() -> None:
 
 
 @pytest.mark.accuracy
-def test_the_true_friction_lies_in_its_interval_and_large_friction_has_no_upper_end(cache) -> None:
+def test_the_true_friction_lies_in_its_interval_and_large_friction_has_no_upper_end(cache):
     held = []
     held_by_both = []
     bounded = 0
@@ -144,7 +144,7 @@ def test_the_true_friction_lies_in_its_interval_and_large_friction_has_no_upper_
     assert bounded >= binom.ppf(CHANCE, EXPERIMENTS // len(TRUTHS), 0.93)
 
 
-def test_two_channels_share_what_scatters_and_what_is_uncertain_of_each_contact() -> None:
+def test_two_channels_share_what_scatters_and_what_is_uncertain_of_each_contact():
     apparatus = calibrated(0)
     stress = measured(0.1, 0)
     film = experiment(0.1, 0).dry.film
@@ -199,7 +199,7 @@ def test_two_channels_share_what_scatters_and_what_is_uncertain_of_each_contact(
     assert found.loads[0].degrees == rest.size - 5
 
 
-def test_the_shear_tells_friction_apart_at_all(cache: Path) -> None:
+def test_the_shear_tells_friction_apart_at_all(cache):
     options = {"friction": (0.0, 0.2, 1.0, math.inf), "loading": "incremental", "cache": cache}
     low, high = (
         compare(measured(friction, 0), calibrated(0)[1], **options) for friction in (0.0, 1.0)
@@ -215,7 +215,7 @@ def test_the_shear_tells_friction_apart_at_all(cache: Path) -> None:
     ]
 
 
-def test_what_does_not_belong_together_is_refused(cache: Path) -> None:
+def test_what_does_not_belong_together_is_refused(cache):
     made = experiment(0.1, 0)
     normal, shear = calibrated(0)
     stress = measured(0.1, 0)
@@ -254,7 +254,7 @@ def test_what_does_not_belong_together_is_refused(cache: Path) -> None:
         compare(cache / "dry.stress.h5", shear, loading=(), cache=cache)
 
 
-def test_a_tangential_artifact_is_applied_to_no_normal_channel_whatever_is_overridden() -> None:
+def test_a_tangential_artifact_is_applied_to_no_normal_channel_whatever_is_overridden():
     made = experiment(0.1, 0)
     shear = calibrated(0)[1]
     for override in (False, True):

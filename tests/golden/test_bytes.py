@@ -13,7 +13,6 @@ import sys
 from pathlib import Path
 from unittest import mock
 
-import pytest
 from golden.make import HERE, LINKS
 from helpers.bounds import FULL
 
@@ -38,7 +37,7 @@ def digests(folder: Path) -> dict[str, str]:
     }
 
 
-def test_two_runs_write_the_same_bytes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_two_runs_write_the_same_bytes(tmp_path, monkeypatch):
     here = tmp_path / "here"
     elsewhere = tmp_path / "elsewhere"
     for folder in (here, elsewhere):

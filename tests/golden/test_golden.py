@@ -22,7 +22,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> Runs:
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-def test_a_command_prints_the_golden_results(name, runs: Runs):
+def test_a_command_prints_the_golden_results(name, runs):
     changes = list(differences(load(name), runs[name], TOLERANCE, SHARE))
     assert not changes, "\n".join(changes[:20])
 
@@ -43,7 +43,7 @@ def test_numbers_are_compared_within_a_share_of_their_uncertainty(changed, place
 
 
 @pytest.mark.parametrize("name", VIEW_COMMANDS)
-def test_a_view_is_the_golden_one(name: str, runs: Runs) -> None:
+def test_a_view_is_the_golden_one(name, runs):
     golden = (VIEWS / f"{name}.txt").read_text(encoding="utf-8").splitlines()
     changes = list(difflib.unified_diff(golden, view(name, runs).splitlines(), lineterm="", n=1))
     assert changes == [], "\n".join(changes[:40])

@@ -58,14 +58,14 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     return files
 
 
-def test_chexus_finds_no_violation(written: dict[str, Path]) -> None:
+def test_chexus_finds_no_violation(written):
     for path in written.values():
         run = ["chexus", "--exit-on-fail", os.fspath(path)]
         outcome = subprocess.run(run, check=False, capture_output=True, text=True)
         assert outcome.returncode == 0, outcome.stdout
 
 
-def test_nxvalidate_and_nxlint_find_nothing(written: dict[str, Path], tmp_path: Path) -> None:
+def test_nxvalidate_and_nxlint_find_nothing(written, tmp_path):
     folder = definitions_folder(tmp_path / "definitions")
     found = {name: violations(path, folder) for name, path in written.items()}
     assert {name: lines for name, lines in found.items() if lines} == {}
@@ -75,7 +75,7 @@ def test_nxvalidate_and_nxlint_find_nothing(written: dict[str, Path], tmp_path: 
         assert "Total number of errors: 0" in outcome.stdout + outcome.stderr, outcome.stdout
 
 
-def test_pynx_finds_every_file_valid(written: dict[str, Path], tmp_path: Path) -> None:
+def test_pynx_finds_every_file_valid(written, tmp_path):
     folder = definitions_folder(tmp_path / "definitions", "pynxtools")
     environment = {**os.environ, "NEXUS_DEF_PATH": os.fspath(folder)}
     for path in written.values():
@@ -87,7 +87,7 @@ def test_pynx_finds_every_file_valid(written: dict[str, Path], tmp_path: Path) -
         assert "WARNING" not in said, said
 
 
-def test_scippnexus_loads_every_group_as_it_is_meant(written: dict[str, Path]) -> None:
+def test_scippnexus_loads_every_group_as_it_is_meant(written):
     import scippnexus
 
     def load(group: scippnexus.Group) -> None:

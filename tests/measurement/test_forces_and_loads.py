@@ -29,7 +29,7 @@ def ratios(found: MeasuredStress) -> np.ndarray:
     return np.array([profile.force / profile.load for profile in found.profiles])
 
 
-def test_there_is_a_check_for_each_load_and_one_for_all() -> None:
+def test_there_is_a_check_for_each_load_and_one_for_all():
     checks = {check.name: check for check in measured(0).checks}
     names = [name for name in checks if "force" in name]
     assert names == [*(f"applied_force_{i}" for i in (1, 2, 3, 4)), "applied_force_all"]
@@ -45,7 +45,7 @@ THICKER = replace(EXACT_FILM, thickness=1.05 * EXACT_FILM.thickness)
 @pytest.mark.parametrize(
     ("kernel", "film"), [(WIDER, EXACT_FILM), (NARROWER, EXACT_FILM), (GAUSSIAN, THICKER)]
 )
-def test_the_force_depends_neither_on_the_width_of_g_nor_on_the_film(kernel, film) -> None:
+def test_the_force_depends_neither_on_the_width_of_g_nor_on_the_film(kernel, film):
     scan = contact_scan(1, **QUIET, load=LOADS[::3])
     right = ratios(memscal.measure_stress(scan, SENSOR))
     sensor = known_apparatus(kernel)
@@ -54,7 +54,7 @@ def test_the_force_depends_neither_on_the_width_of_g_nor_on_the_film(kernel, fil
     assert kernel is GAUSSIAN or abs(np.mean(wrong - right)) < 0.006
 
 
-def test_all_profiles_together_tell_more_than_one_until_a_is_all_that_is_left() -> None:
+def test_all_profiles_together_tell_more_than_one_until_a_is_all_that_is_left():
     found = measured(3, conversion_uncertainty=0.01)
     single = [p.force_budget["scan"] / p.load for p in found.profiles]
     _, spread = pooled_force(found.profiles)
@@ -63,7 +63,7 @@ def test_all_profiles_together_tell_more_than_one_until_a_is_all_that_is_left() 
     assert spread == pytest.approx(np.hypot(own, 0.01), rel=0.03)
 
 
-def test_a_common_error_of_the_loads_does_not_average_out() -> None:
+def test_a_common_error_of_the_loads_does_not_average_out():
     one, two = (
         pooled_force(measured(3, load=loads, load_uncertainty=0.03).profiles)[1]
         for loads in ((2.75,), LOADS[::3])
@@ -72,7 +72,7 @@ def test_a_common_error_of_the_loads_does_not_average_out() -> None:
     assert one > two
 
 
-def test_every_line_goes_to_the_part_of_its_load() -> None:
+def test_every_line_goes_to_the_part_of_its_load():
     scan = contact_scan(repeats=2, record_loads=True)
     parts = single_loads(scan)
     np.testing.assert_allclose([part.load for part in parts], LOADS, rtol=0.02)
@@ -84,14 +84,14 @@ def test_every_line_goes_to_the_part_of_its_load() -> None:
         assert np.all(np.abs(part.normal_load / part.load - 1) < 0.15)
 
 
-def test_the_common_uncertainty_of_the_load_grows_with_the_load() -> None:
+def test_the_common_uncertainty_of_the_load_grows_with_the_load():
     scan = contact_scan(load_uncertainty=0.01)
     spreads = [part.load_uncertainty for part in single_loads(scan)]
     np.testing.assert_allclose(spreads, 0.01 * np.array(LOADS), rtol=1e-12)
 
 
 @pytest.mark.parametrize("kind", ["line", "repeats", "raster"])
-def test_a_scan_that_records_no_load_is_one_part(kind: str) -> None:
+def test_a_scan_that_records_no_load_is_one_part(kind):
     scan = make_scan(kind, normal_load=None)
     [part] = single_loads(scan)
     assert part is scan
@@ -104,7 +104,7 @@ def test_a_scan_that_records_no_load_is_one_part(kind: str) -> None:
         (1, np.nan, "line 2: every load is missing"),
     ],
 )
-def test_a_line_of_several_loads_or_of_none_is_refused_by_its_number(places, load, words) -> None:
+def test_a_line_of_several_loads_or_of_none_is_refused_by_its_number(places, load, words):
     scan = contact_scan()
     loads = scan.normal_load.copy()
     loads[places] = load

@@ -1,7 +1,6 @@
 """Measured stress is the pressed contact's, blurred, as far as its uncertainty says."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -36,7 +35,7 @@ def reduced(profile: MeasuredProfile) -> float:
     return float(off @ np.linalg.solve(profile.covariance, off)) / off.size
 
 
-def test_without_noise_the_profiles_are_the_calculated_ones() -> None:
+def test_without_noise_the_profiles_are_the_calculated_ones():
     found = made.measured(**QUIET, state_noise=False)
     assert found.passed, found.messages
     assert [profile.load for profile in found.profiles] == list(made.LOADS)
@@ -48,13 +47,13 @@ def test_without_noise_the_profiles_are_the_calculated_ones() -> None:
         assert np.all(np.diff(profile.r) >= 0)
 
 
-def test_the_stated_covariance_is_that_of_the_errors() -> None:
+def test_the_stated_covariance_is_that_of_the_errors():
     values = [reduced(profile) for seed in range(SEEDS) for profile in made.measured(seed).profiles]
     # 33 points each; the scan's own baseline and centre take a few of them.
     assert np.mean(values) == pytest.approx(1.0, abs=4 * np.sqrt(2 / (33 * len(values))) + 0.12)
 
 
-def test_the_maximum_and_the_force_have_the_errors_that_they_state() -> None:
+def test_the_maximum_and_the_force_have_the_errors_that_they_state():
     z = []
     for seed in range(SEEDS):
         for profile in made.measured(seed).profiles:
@@ -65,7 +64,7 @@ def test_the_maximum_and_the_force_have_the_errors_that_they_state() -> None:
     assert 0.3 < np.mean(np.square(z)) < 1 + 4 * np.sqrt(2 / len(z))
 
 
-def test_an_uncertain_conversion_constant_is_common_to_all_points_and_to_the_maximum() -> None:
+def test_an_uncertain_conversion_constant_is_common_to_all_points_and_to_the_maximum():
     exact = made.measured(3, load=ENDS)
     found = made.measured(3, conversion_uncertainty=0.02, load=ENDS)
     for before, after in zip(exact.profiles, found.profiles, strict=True):
@@ -77,7 +76,7 @@ def test_an_uncertain_conversion_constant_is_common_to_all_points_and_to_the_max
         assert after.maximum_budget["apparatus"] == pytest.approx(0.02 * after.maximum, rel=0.02)
 
 
-def test_a_width_of_g_that_is_wrong_by_what_is_stated_hardly_moves_the_maximum() -> None:
+def test_a_width_of_g_that_is_wrong_by_what_is_stated_hardly_moves_the_maximum():
     scan = made.contact_scan(1, load=ENDS)
     right = memscal.measure_stress(scan, made.known_apparatus(width_uncertainty=0.05))
     kernel = memscal.GaussianMixture((1.0,), (1.05 * made.SIGMA,))
@@ -87,7 +86,7 @@ def test_a_width_of_g_that_is_wrong_by_what_is_stated_hardly_moves_the_maximum()
         assert a.maximum_budget["apparatus"] < 0.005 * a.maximum
 
 
-def test_the_sources_of_the_place_share_their_joint_covariance_without_a_rest() -> None:
+def test_the_sources_of_the_place_share_their_joint_covariance_without_a_rest():
     parts = single_loads(made.contact_scan(2, load=ENDS))
     for profile, part in zip(made.measured(2, load=ENDS).profiles, parts, strict=True):
         [signal] = contact_signals([part], SENSOR)
@@ -109,7 +108,7 @@ def test_the_sources_of_the_place_share_their_joint_covariance_without_a_rest() 
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.15, np.inf])
-def test_recorded_loads_off_the_nominal_one_are_corrected(friction: float) -> None:
+def test_recorded_loads_off_the_nominal_one_are_corrected(friction):
     """A contact that sticks follows its load by up to 40 % more than one that slides."""
     options = {**QUIET, "load_scatter": 0.03, "record_loads": True, "load_reading": 0.0}
     options["load"] = ENDS
@@ -118,7 +117,7 @@ def test_recorded_loads_off_the_nominal_one_are_corrected(friction: float) -> No
         np.testing.assert_allclose(profile.s_zz, truth, atol=2e-3 * truth.max())
 
 
-def test_an_unstated_noise_is_told_from_the_scatter_of_the_loads() -> None:
+def test_an_unstated_noise_is_told_from_the_scatter_of_the_loads():
     ratios = []
     for seed in range(SEEDS):
         scan = made.contact_scan(seed)
@@ -131,7 +130,7 @@ def test_an_unstated_noise_is_told_from_the_scatter_of_the_loads() -> None:
     assert 0.5 < min(ratios) <= max(ratios) < 1.7
 
 
-def test_contacts_at_single_points_give_what_rows_give() -> None:
+def test_contacts_at_single_points_give_what_rows_give():
     scan = made.contact_scan(repeats=2, record_loads=True, load=ENDS)
     rows, points = (
         memscal.measure_stress(s, SENSOR).profiles for s in (scan, made.as_points(scan))
@@ -143,7 +142,7 @@ def test_contacts_at_single_points_give_what_rows_give() -> None:
         np.testing.assert_allclose(one.s_zz, other.s_zz, atol=1e-9 * other.maximum)
 
 
-def test_correlated_noise_is_averaged_with_its_correlation() -> None:
+def test_correlated_noise_is_averaged_with_its_correlation():
     exact = {"load_scatter": 0.0, "load_reading": 0.0, "record_loads": False}
     scan = made.contact_scan(6, repeats=2, load=ENDS, **exact)
     near = 0.4 ** np.abs(np.subtract.outer(np.arange(scan.x.size), np.arange(scan.x.size)))
@@ -160,7 +159,7 @@ def test_correlated_noise_is_averaged_with_its_correlation() -> None:
         np.testing.assert_allclose(found / found[0, 0], expected / expected[0, 0], atol=1e-9)
 
 
-def test_files_of_many_points_grow_with_their_number(tmp_path: Path) -> None:
+def test_files_of_many_points_grow_with_their_number(tmp_path):
     found = memscal.measure_stress(memscal.simulate(film=SENSOR.film, points=2000), SENSOR)
     found.save(tmp_path / "many.h5")
     found.plot().savefig(tmp_path / "many.svg")
@@ -170,7 +169,7 @@ def test_files_of_many_points_grow_with_their_number(tmp_path: Path) -> None:
     assert (tmp_path / "many.svg").stat().st_size < 500_000
 
 
-def test_a_rod_is_measured_like_a_sphere() -> None:
+def test_a_rod_is_measured_like_a_sphere():
     z = []
     for seed in range(SEEDS):
         scan = memscal.simulate(film=SENSOR.film, seed=seed, points=33)
@@ -194,13 +193,13 @@ def test_a_rod_is_measured_like_a_sphere() -> None:
         ({"film": replace(made.EXACT_FILM, law="neo-hookean")}, 'law "neo-hookean" .*"linear"'),
     ],
 )
-def test_what_does_not_belong_together_is_refused_by_both_names(changes, words) -> None:
+def test_what_does_not_belong_together_is_refused_by_both_names(changes, words):
     scan = replace(made.contact_scan(load=(1.37,)), source=SourceFile("s.h5", ""), **changes)
     with pytest.raises(InputError, match=rf"not belong together: .*{words}"):
         memscal.measure_stress(scan, replace(SENSOR, film=replace(made.EXACT_FILM, law="linear")))
 
 
-def test_a_film_of_another_name_is_refused_unless_it_is_overridden() -> None:
+def test_a_film_of_another_name_is_refused_unless_it_is_overridden():
     named = replace(SENSOR, film=replace(made.EXACT_FILM, name="film 1"))
     scan = replace(made.contact_scan(load=(1.37,)), film=replace(made.EXACT_FILM, name="film 2"))
     with pytest.raises(InputError, match='film "film 2" in the scan, "film 1" in the artifact'):
@@ -226,36 +225,36 @@ def spoilt(row: int, columns: slice) -> Scan:
         (2, slice(12, 21), r"1\.37 N, dry: 9 neighbouring points .* -2 to 2 mm"),
     ],
 )
-def test_a_gap_of_a_contact_s_radius_is_refused_with_its_place(row, columns, words) -> None:
+def test_a_gap_of_a_contact_s_radius_is_refused_with_its_place(row, columns, words):
     with pytest.raises(InputError, match=words):
         memscal.measure_stress(spoilt(row, columns), SENSOR)
 
 
-def test_a_few_missing_points_are_no_gap() -> None:
+def test_a_few_missing_points_are_no_gap():
     found = memscal.measure_stress(spoilt(3, slice(14, 16)), SENSOR)
     assert found.profiles[3].r.size == 31
     assert any("2 points of the scan are missing" in message.text for message in found.messages)
 
 
-def test_what_only_a_calibration_counts_is_named() -> None:
+def test_what_only_a_calibration_counts_is_named():
     scan = replace(made.contact_scan(load=(1.37,)), roundness_uncertainty=0.1, gain_uncertainty=0.1)
     found = memscal.measure_stress(scan, SENSOR)
     assert any(m.text.endswith("in a calibration only: roundness.") for m in found.messages)
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.3])
-def test_a_scan_that_never_comes_down_to_its_baseline_is_refused(friction: float) -> None:
+def test_a_scan_that_never_comes_down_to_its_baseline_is_refused(friction):
     short = made.contact_scan(spacing=0.22e-3, friction=friction, load=(0.69, 2.75))
     with pytest.raises(FitError, match=r"0\.69 N, dry: the scan ends .* still has \d+% of its max"):
         memscal.measure_stress(short, SENSOR)
 
 
-def test_a_scan_that_ends_on_one_side_of_the_contact_is_refused() -> None:
+def test_a_scan_that_ends_on_one_side_of_the_contact_is_refused():
     with pytest.raises(FitError, match="the scan ends"):
         memscal.measure_stress(made.contact_scan(load=(2.75,), centre=(6e-3, 0.0)), SENSOR)
 
 
-def test_a_load_beyond_the_model_is_refused_with_file_and_load() -> None:
+def test_a_load_beyond_the_model_is_refused_with_file_and_load():
     # Of several, the one that cannot be.
     scan = made.contact_scan(load=(0.34, 0.69))
     loads = np.where(np.arange(2)[:, None] == 1, 1e6, 1.0) * scan.normal_load
@@ -265,7 +264,7 @@ def test_a_load_beyond_the_model_is_refused_with_file_and_load() -> None:
 
 
 @pytest.mark.parametrize("loads", [(1.37,), tuple(np.geomspace(0.05, 3.0, 8))])
-def test_contacts_near_the_nominal_loads_are_those_of_converged_ones(loads: tuple) -> None:
+def test_contacts_near_the_nominal_loads_are_those_of_converged_ones(loads):
     scan = made.contact_scan(load=loads)
     nodes = Wavenumbers.covering(20 / made.EXACT_FILM.thickness, 48e-3)
     transfer = made.CONVERSION * made.GAUSSIAN.transform(nodes.k)
@@ -284,7 +283,7 @@ def test_contacts_near_the_nominal_loads_are_those_of_converged_ones(loads: tupl
             np.testing.assert_allclose(signal.by_load[i], by_load, atol=1e-3 * by_load.max())
 
 
-def test_stresses_measured_one_by_one_are_those_measured_together() -> None:
+def test_stresses_measured_one_by_one_are_those_measured_together():
     dry = made.contact_scan(1, load=made.LOADS[:2])
     wet = made.contact_scan(2, load=made.LOADS[:1], lubrication="lubricated")
     together = memscal.measure_stress([dry, wet], SENSOR)
@@ -299,7 +298,7 @@ def test_stresses_measured_one_by_one_are_those_measured_together() -> None:
         joined_stress([together, memscal.measure_stress(wet, SENSOR)])
 
 
-def test_what_is_no_scan_is_refused() -> None:
+def test_what_is_no_scan_is_refused():
     with pytest.raises(InputError, match="a float where a Scan is needed"):
         memscal.measure_stress([1.0], SENSOR)
     with pytest.raises(InputError, match="no scan"):

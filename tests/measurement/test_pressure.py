@@ -26,7 +26,7 @@ def hankel(order: int, profile: np.ndarray, r: np.ndarray, weights: np.ndarray) 
 
 @pytest.mark.parametrize("exponent", [1.0, 2.0, 3.5])
 @pytest.mark.parametrize("shear", [0.0, -0.4])
-def test_the_transform_is_that_of_pressure_and_shear_through_the_film(exponent, shear) -> None:
+def test_the_transform_is_that_of_pressure_and_shear_through_the_film(exponent, shear):
     radius = WIDTH * math.sqrt(2 * (exponent + 2))
     r, weights = gauss_between(np.linspace(0.0, radius, 40), 16)
     pressure = (1 - (r / radius) ** 2) ** exponent
@@ -41,7 +41,7 @@ def test_the_transform_is_that_of_pressure_and_shear_through_the_film(exponent, 
     np.testing.assert_allclose(film * shape.transform(K, WIDTH)[0], expected, atol=1e-6)
 
 
-def test_shapes_of_one_width_have_one_mean_square_radius() -> None:
+def test_shapes_of_one_width_have_one_mean_square_radius():
     k = np.array([1.0])
     normal = [shape for shape in pressure_shapes(EXACT_FILM) if shape.shear == 0.0]
     assert len(normal) > 1
@@ -51,7 +51,7 @@ def test_shapes_of_one_width_have_one_mean_square_radius() -> None:
 
 
 @pytest.mark.parametrize("seed", range(3 if FULL else 1))
-def test_fits_and_likelihoods_of_shapes_are_those_of_least_squares(seed: int) -> None:
+def test_fits_and_likelihoods_of_shapes_are_those_of_least_squares(seed):
     scan = made.sphere_scan(made.pressed(), seed=seed)
     points = measured_points(scan)
     start, _ = gaussian_pressure(scan, made.known_apparatus(), points)
@@ -88,7 +88,7 @@ def test_fits_and_likelihoods_of_shapes_are_those_of_least_squares(seed: int) ->
 
 
 @pytest.mark.parametrize("noise", [0.005, 0.02, 0.05])
-def test_a_fit_that_does_not_settle_takes_the_gaussian(noise: float) -> None:
+def test_a_fit_that_does_not_settle_takes_the_gaussian(noise):
     # The slope by the width of a narrow pressure vanishes with the width: steps swing.
     contact = made.pressed(indenter=made.EXACT_ROD)
     for seed in range(8 if FULL else 4):

@@ -41,7 +41,7 @@ def restored(load: float, friction: float, seed: int, noise: float = NOISE) -> R
 
 
 @pytest.mark.parametrize(("load", "friction"), [(0.34, np.inf), (2.75, 0.0)])
-def test_without_noise_the_calculated_stress_comes_back(load: float, friction: float) -> None:
+def test_without_noise_the_calculated_stress_comes_back(load, friction):
     found = restored(load, friction, 0, 0.0)
     contact = made.pressed(load, friction)
     assert made.plane_error(found.r, found.sigma_zz, contact.base_stress(found.r)) < 4e-3
@@ -50,7 +50,7 @@ def test_without_noise_the_calculated_stress_comes_back(load: float, friction: f
 
 
 @pytest.mark.parametrize("law", ["neo-hookean", ""])
-def test_a_film_at_finite_strain_is_not_taken_as_linear(law: str) -> None:
+def test_a_film_at_finite_strain_is_not_taken_as_linear(law):
     contact = tabulated_rod(RUBBER, made.EXACT_ROD, 1.0, sticking=True)
     film = replace(RUBBER, law=law)
     scans = [replace(made.sphere_scan(contact, seed=seed), film=film) for seed in range(FEW)]
@@ -65,7 +65,7 @@ def test_a_film_at_finite_strain_is_not_taken_as_linear(law: str) -> None:
         assert np.mean([f.force_budget["film"] for f in found]) > 0.05
 
 
-def test_the_restored_stress_blurred_again_is_what_was_measured() -> None:
+def test_the_restored_stress_blurred_again_is_what_was_measured():
     found = [restored(1.0, 0.0, seed) for seed in range(FEW)]
     total, degrees = (sum(getattr(f, name) for f in found) for name in ("chi_square", "degrees"))
     # What departures explain of the noise is at most the handful that the scan can tell apart.
@@ -76,7 +76,7 @@ def test_the_restored_stress_blurred_again_is_what_was_measured() -> None:
         np.testing.assert_allclose(apart, f.residual[order] / made.CONVERSION, atol=20.0)
 
 
-def test_a_calculated_contact_is_told_from_another() -> None:
+def test_a_calculated_contact_is_told_from_another():
     found = restored(1.0, np.inf, 3)
     same = found.compare(made.pressed(1.0, np.inf))
     other = found.compare(made.pressed(1.0, 0.0))
@@ -84,7 +84,7 @@ def test_a_calculated_contact_is_told_from_another() -> None:
     assert same.within > 0.7 > other.within
 
 
-def test_the_direct_comparison_has_the_chi_square_of_its_degrees() -> None:
+def test_the_direct_comparison_has_the_chi_square_of_its_degrees():
     compared = [restored(1.0, 0.0, seed).comparison for seed in range(FEW)]
     total = sum(c.chi_square * c.degrees for c in compared if c is not None)
     degrees = sum(c.degrees for c in compared if c is not None)
@@ -122,7 +122,7 @@ STRONGER = replace(QUIET, u_zz=(1 + SHARE) * QUIET.u_zz)
     ],
     ids=["position scale", "film", "width of G", "conversion constant"],
 )
-def test_what_is_uncertain_counts_as_much_as_it_changes(source, stated, wrong) -> None:
+def test_what_is_uncertain_counts_as_much_as_it_changes(source, stated, wrong):
     r = np.array([0.0, 1e-3, 1.5e-3, 3e-3])
     found = memscal.restore(*stated)
     changed = memscal.restore(*wrong, override=True)
@@ -132,7 +132,7 @@ def test_what_is_uncertain_counts_as_much_as_it_changes(source, stated, wrong) -
     np.testing.assert_allclose(counted / size, np.abs(difference) / size, atol=5e-4)
 
 
-def test_less_noise_resolves_more() -> None:
+def test_less_noise_resolves_more():
     resolved = [restored(1.0, 0.0, 0, noise).resolved_wavenumber for noise in (0.02, 0.005, 0.001)]
     assert resolved == sorted(resolved)
     assert resolved[0] < resolved[-1] <= np.pi / 0.5e-3 * (1 + 1e-9)
@@ -141,7 +141,7 @@ def test_less_noise_resolves_more() -> None:
 @pytest.mark.parametrize(
     "setting", [{"load": (0.5, 1.0, 2.0), "points": 33}, {"raster": True, "points": 15}], ids=str
 )
-def test_a_rod_s_stress_comes_back_from_several_loads_and_from_a_raster(setting) -> None:
+def test_a_rod_s_stress_comes_back_from_several_loads_and_from_a_raster(setting):
     scans = [simulate(film=EXACT.film, seed=s, **setting) for s in range(FEW)]
     found = [memscal.restore(scan, EXACT) for scan in scans]
     z = [(f.force - f.scan.load) / f.force_uncertainty for f in found]
@@ -159,19 +159,19 @@ def test_a_rod_s_stress_comes_back_from_several_loads_and_from_a_raster(setting)
         assert np.all(np.abs(f.centre[: 1 + raster] - [0.14e-3, 0.0][: 1 + raster]) < 5 * u)
 
 
-def test_the_direction_of_a_scan_changes_nothing() -> None:
+def test_the_direction_of_a_scan_changes_nothing():
     along_x, along_y = (memscal.restore(replace(SCAN, direction=d), EXACT) for d in "xy")
     np.testing.assert_allclose(along_y.sigma_zz, along_x.sigma_zz)
     assert along_y.centre[1] == along_x.centre[0]
 
 
-def test_a_wrong_unit_of_the_voltage_fails_the_check_of_the_force() -> None:
+def test_a_wrong_unit_of_the_voltage_fails_the_check_of_the_force():
     scan = replace(SCAN, u_zz=1e3 * SCAN.u_zz, u_zz_errors=1e3 * SCAN.u_zz_errors)
     found = memscal.restore(scan, EXACT)
     assert "restored_force" in {check.name for check in found.checks if not check.passed}
 
 
-def test_a_spoilt_point_is_named_and_moves_little() -> None:
+def test_a_spoilt_point_is_named_and_moves_little():
     scan = made.sphere_scan(made.pressed(), seed=4)
     u = scan.u_zz.copy()
     u[14] *= 1.5
@@ -180,7 +180,7 @@ def test_a_spoilt_point_is_named_and_moves_little() -> None:
     assert abs(spoilt.stress(0.0) - clean.stress(0.0)) < 2 * clean.stress_uncertainty(0.0)
 
 
-def test_the_table_is_a_reference_with_uncertainties() -> None:
+def test_the_table_is_a_reference_with_uncertainties():
     found = restored(1.0, 0.0, 0)
     profile = found.profile()
     np.testing.assert_allclose(profile.sigma_zz_errors, found.stress_uncertainty(found.r))
@@ -205,7 +205,7 @@ BAD = {
 
 
 @pytest.mark.parametrize("case", BAD)
-def test_what_cannot_be_restored_is_refused_with_a_reason(case: str) -> None:
+def test_what_cannot_be_restored_is_refused_with_a_reason(case):
     scan, apparatus, text = BAD[case]
     with pytest.raises(memscal.MemscalError) as caught:
         memscal.restore(scan, apparatus)
@@ -214,11 +214,11 @@ def test_what_cannot_be_restored_is_refused_with_a_reason(case: str) -> None:
 
 
 @pytest.mark.parametrize("expected", [3, made.pressed(2.75)])
-def test_an_expected_stress_that_does_not_fit_is_refused(expected: object) -> None:
+def test_an_expected_stress_that_does_not_fit_is_refused(expected):
     with pytest.raises(memscal.MemscalError):
         memscal.restore(SCAN, EXACT, expected=expected)
 
 
-def test_a_radius_beyond_what_was_computed_is_refused() -> None:
+def test_a_radius_beyond_what_was_computed_is_refused():
     with pytest.raises(memscal.MemscalError, match="24 mm"):
         restored(1.0, 0.0, 0).stress(1.0)

@@ -49,7 +49,7 @@ def by_both(
         pytest.param(0.5, 0.3, "total", marks=FULL),
     ],
 )
-def test_both_find_the_same_sphere(nu, friction, loading) -> None:
+def test_both_find_the_same_sphere(nu, friction, loading):
     hankel, fem = by_both(nu, SPHERE, 1.37, friction, loading)
     assert fem.backend == "fem"
     assert "triangles" in fem.discretisation
@@ -72,7 +72,7 @@ def test_both_find_the_same_sphere(nu, friction, loading) -> None:
     ("nu", "load"),
     [(0.47, 0.34), pytest.param(0.5, 2.75, marks=FULL), pytest.param(0.45, 2.75, marks=FULL)],
 )
-def test_both_find_the_same_sphere_that_sticks_at_once(nu, load) -> None:
+def test_both_find_the_same_sphere_that_sticks_at_once(nu, load):
     hankel, fem, slips = (
         indent(film(nu), SPHERE, load=load, friction=mu, loading="total", backend=way, rings=48)
         for way, mu in (("hankel", math.inf), ("fem", math.inf), ("hankel", 10.0))
@@ -86,19 +86,19 @@ def test_both_find_the_same_sphere_that_sticks_at_once(nu, load) -> None:
 @pytest.mark.parametrize(
     "friction", [0.2, pytest.param(0.0, marks=FULL), pytest.param(math.inf, marks=FULL)]
 )
-def test_both_find_the_same_rod(friction) -> None:
+def test_both_find_the_same_rod(friction):
     hankel, fem = by_both(0.5, Rod(radius=0.25e-3), 1.0, friction)
     assert fem.depth == pytest.approx(hankel.depth, rel=AGREEMENT)
     difference = fem.base_stress(R) - hankel.base_stress(R)
     assert np.max(np.abs(difference)) < AGREEMENT * hankel.max_base_stress
 
 
-def test_a_film_by_hankel_transforms_has_no_end() -> None:
+def test_a_film_by_hankel_transforms_has_no_end():
     with pytest.raises(InputError, match="a film has no end"):
         indent(film(0.5), SPHERE, load=1.37, film_radius=25e-3)
 
 
-def test_only_finite_elements_have_a_mesh_to_show() -> None:
+def test_only_finite_elements_have_a_mesh_to_show():
     hankel, fem = by_both(0.5, SPHERE, 1.37, 0.0)
     assert fem.mesh().points[:, 1].max() == pytest.approx(2e-3)
     with pytest.raises(InputError, match="has no mesh"):

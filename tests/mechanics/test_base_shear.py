@@ -11,7 +11,7 @@ from memscal import indent
 
 
 @pytest.mark.parametrize("nu", [0.2, 0.45, 0.5])
-def test_the_first_moment_of_the_shear_is_that_of_a_column_under_the_load(nu) -> None:
+def test_the_first_moment_of_the_shear_is_that_of_a_column_under_the_load(nu):
     # Equilibrium of the whole film: at small k every film is an oedometer under the mean
     # pressure, whose radial stress nu/(1 - nu) p on its thickness h is what the base holds.
     k = 1e-3 / film(nu).thickness
@@ -22,7 +22,7 @@ def test_the_first_moment_of_the_shear_is_that_of_a_column_under_the_load(nu) ->
 @pytest.mark.parametrize(
     ("indenter", "nu", "friction"), [(SPHERE, 0.5, 0.2), (ROD, 0.3, 0.0), (ROD, 0.5, np.inf)]
 )
-def test_the_spectrum_is_an_integral_of_the_shear_and_odd_in_k(indenter, nu, friction) -> None:
+def test_the_spectrum_is_an_integral_of_the_shear_and_odd_in_k(indenter, nu, friction):
     contact = indent(film(nu), indenter, load=1.37, friction=friction)
     k = np.array([150.0, 700.0, 2000.0])
     # Even radii, forty to the film's thickness, over which the shear is smooth.

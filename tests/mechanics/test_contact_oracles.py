@@ -16,7 +16,7 @@ from memscal.model.arrays import FloatArray
 FRICTIONS = (0.0, 0.1, 0.3, 1.6, math.inf)
 
 
-def test_a_sphere_on_a_thick_film_is_hertz_s() -> None:
+def test_a_sphere_on_a_thick_film_is_hertz_s():
     thick = film(0.3, thickness=2.0)
     contact = indent(thick, SPHERE, load=1e-2)
     radius = (3 * contact.load * SPHERE.radius / (4 * thick.contact_modulus)) ** (1 / 3)
@@ -29,7 +29,7 @@ def test_a_sphere_on_a_thick_film_is_hertz_s() -> None:
     np.testing.assert_allclose(contact.interface_pressure(r), hertz, atol=2e-3 * peak)
 
 
-def test_a_cone_on_a_thick_film_is_sneddon_s() -> None:
+def test_a_cone_on_a_thick_film_is_sneddon_s():
     thick = film(0.3, thickness=2.0)
     contact = indent(thick, Cone(inclination=0.1), load=1e-2)
     slope = math.tan(0.1)
@@ -41,7 +41,7 @@ def test_a_cone_on_a_thick_film_is_sneddon_s() -> None:
 @pytest.mark.parametrize(
     ("friction", "loading"), [(0.1, "incremental"), (1.0, "total"), (math.inf, "incremental")]
 )
-def test_friction_changes_nothing_on_an_incompressible_half_space(friction, loading) -> None:
+def test_friction_changes_nothing_on_an_incompressible_half_space(friction, loading):
     thick = film(0.5, thickness=2.0)
     smooth = indent(thick, SPHERE, load=1e-2)
     rough = indent(thick, SPHERE, load=1e-2, friction=friction, loading=loading)
@@ -51,7 +51,7 @@ def test_friction_changes_nothing_on_an_incompressible_half_space(friction, load
     assert np.max(np.abs(difference)) < 2e-3 * smooth.max_interface_stress
 
 
-def test_a_thin_compressible_film_is_a_row_of_springs() -> None:
+def test_a_thin_compressible_film_is_a_row_of_springs():
     errors = []
     for thickness in (2e-4, 4e-5):
         thin = film(0.3, thickness=thickness)
@@ -64,7 +64,7 @@ def test_a_thin_compressible_film_is_a_row_of_springs() -> None:
 
 
 @pytest.mark.parametrize(("friction", "grip"), [(0.0, 1), (math.inf, 4)])
-def test_a_thin_incompressible_film_is_squeezed_as_a_lubricant(friction, grip) -> None:
+def test_a_thin_incompressible_film_is_squeezed_as_a_lubricant(friction, grip):
     # w = -h^3 / 3G div grad p with a free surface, four times stiffer where both faces stick:
     # P = grip pi G a^6 / (32 R h^3), delta = a^2 / 4R.  The error falls as h/a.
     excess = []
@@ -84,7 +84,7 @@ def test_a_thin_incompressible_film_is_squeezed_as_a_lubricant(friction, grip) -
 @pytest.mark.parametrize(
     ("nu", "friction"), [(0.0, math.inf), (0.3, 0.0), (0.495, math.inf), (0.5, 0.0)]
 )
-def test_every_load_increment_is_a_flat_punch_s(nu, friction) -> None:
+def test_every_load_increment_is_a_flat_punch_s(nu, friction):
     # What is in contact goes down together, and sticks, if it does, where it touched: between two
     # loads a contact is stiff as a rod of its radius (Mossakovskii's argument, on any film).
     path = indent(film(nu), SPHERE, load=list(np.linspace(1.0, 1.6, 7)), friction=friction)
@@ -102,7 +102,7 @@ def test_every_load_increment_is_a_flat_punch_s(nu, friction) -> None:
 
 @pytest.mark.parametrize("friction", FRICTIONS)
 @pytest.mark.parametrize("loading", ["incremental", "total"])
-def test_the_base_carries_the_load(friction, loading) -> None:
+def test_the_base_carries_the_load(friction, loading):
     contact = indent(film(), SPHERE, load=1.37, friction=friction, loading=loading)
     r, weights = gauss_panels(contact.contact_radius + 80e-3, 4e-3)
     force = 2 * math.pi * np.sum(weights * r * contact.base_stress(r))
@@ -121,7 +121,7 @@ def test_the_base_carries_the_load(friction, loading) -> None:
         if nu > 0.4 or loading == "incremental" or friction < 10
     ],
 )
-def test_signorini_s_and_amontons_conditions_hold(nu, friction, loading) -> None:
+def test_signorini_s_and_amontons_conditions_hold(nu, friction, loading):
     setting = {"friction": friction, "loading": loading, "rings": 48}
     for contact in indent(film(nu), SPHERE, load=LOADS[1::2], **setting):
         a = contact.contact_radius
@@ -142,7 +142,7 @@ def test_signorini_s_and_amontons_conditions_hold(nu, friction, loading) -> None
         assert np.all(beyond > 0)
 
 
-def test_a_profile_is_what_it_samples() -> None:
+def test_a_profile_is_what_it_samples():
     table = Profile.from_function(lambda r: r**2 / (2 * SPHERE.radius), extent=10e-3)
     sampled, exact = (indent(film(), tip, load=1.0, friction=0.2) for tip in (table, SPHERE))
     # Sphere and parabola differ by (a/2R)^2 of the height.
@@ -150,7 +150,7 @@ def test_a_profile_is_what_it_samples() -> None:
     assert sampled.base_stress(0.0) == pytest.approx(float(exact.base_stress(0.0)), rel=2e-4)
 
 
-def test_a_hollow_tip_touches_on_a_ring_first() -> None:
+def test_a_hollow_tip_touches_on_a_ring_first():
     def hollow(r: FloatArray) -> FloatArray:
         dip = 5e-6 * (1 - np.minimum(r / 1.5e-3, 1) ** 2) ** 2
         return np.asarray(dip + np.maximum(r - 1.5e-3, 0) ** 2 / 0.05)
@@ -163,7 +163,7 @@ def test_a_hollow_tip_touches_on_a_ring_first() -> None:
 
 
 @pytest.mark.parametrize("friction", [0.2, 1.0])
-def test_a_rod_slips_in_a_ring_between_sliding_and_sticking(friction) -> None:
+def test_a_rod_slips_in_a_ring_between_sliding_and_sticking(friction):
     contacts = {
         mu: indent(film(0.3), Rod(radius=0.5e-3), load=0.2, friction=mu)
         for mu in (0.0, friction, math.inf)
@@ -174,7 +174,7 @@ def test_a_rod_slips_in_a_ring_between_sliding_and_sticking(friction) -> None:
 
 
 @pytest.mark.parametrize("nu", [0.3, 0.5])
-def test_rings_and_spherical_bessel_functions_solve_the_same_rod(nu) -> None:
+def test_rings_and_spherical_bessel_functions_solve_the_same_rod(nu):
     # A friction so low that it does nothing takes the rings' way.
     rod = Rod(radius=0.25e-3)
     by_rings, by_series = (indent(film(nu), rod, load=1.0, friction=mu) for mu in (1e-9, 0.0))
@@ -185,7 +185,7 @@ def test_rings_and_spherical_bessel_functions_solve_the_same_rod(nu) -> None:
     assert np.max(np.abs(difference)) < 1e-6 * by_series.max_base_stress
 
 
-def test_a_contact_does_not_depend_on_the_rings_by_more_than_it_says() -> None:
+def test_a_contact_does_not_depend_on_the_rings_by_more_than_it_says():
     for friction in (0.0, 0.3, math.inf):
         coarse = indent(film(), SPHERE, load=1.37, friction=friction, rings=48)
         fine = indent(film(), SPHERE, load=1.37, friction=friction, rings=128)
@@ -195,7 +195,7 @@ def test_a_contact_does_not_depend_on_the_rings_by_more_than_it_says() -> None:
         assert fine.convergence < 3e-5
 
 
-def test_a_load_that_outgrows_the_film_the_model_or_the_tip_is_refused() -> None:
+def test_a_load_that_outgrows_the_film_the_model_or_the_tip_is_refused():
     with pytest.raises(DomainError, match="would sink"):
         indent(film(), Cone(inclination=1.5), load=200.0)
     with pytest.raises(DomainError, match="times as wide as the film is thick"):
@@ -205,7 +205,7 @@ def test_a_load_that_outgrows_the_film_the_model_or_the_tip_is_refused() -> None
         indent(film(), short, load=1.0)
 
 
-def test_a_contact_that_does_not_settle_is_an_error_that_carries_the_last_one(monkeypatch) -> None:
+def test_a_contact_that_does_not_settle_is_an_error_that_carries_the_last_one(monkeypatch):
     monkeypatch.setattr("memscal.mechanics.solver.step._MOST_ITERATIONS", 4)
     with pytest.raises(ConvergenceError, match="did not settle") as caught:
         indent(film(0.3), SPHERE, load=[0.011, 1.111], friction=0.123, rings=64)
@@ -214,7 +214,7 @@ def test_a_contact_that_does_not_settle_is_an_error_that_carries_the_last_one(mo
 
 
 @pytest.mark.parametrize("way", ["hankel", "fem"])
-def test_a_film_that_sticks_at_once_is_refused_if_it_would_enter_the_indenter(way) -> None:
+def test_a_film_that_sticks_at_once_is_refused_if_it_would_enter_the_indenter(way):
     with pytest.raises(ConvergenceError, match="Load incrementally"):
         indent(
             *(film(0.1), SPHERE),

@@ -16,7 +16,7 @@ CROWDED = 1 - np.linspace(1.0, 0.0, 60) ** 4
 
 
 @pytest.mark.parametrize("rings", [EVEN, CROWDED], ids=["even", "crowded"])
-def test_a_disc_of_pressure_presses_as_love_found(rings) -> None:
+def test_a_disc_of_pressure_presses_as_love_found(rings):
     x = np.array([0.0, 0.1, 0.5, 0.99, 0.999999, 1.0, 1.000001, 1.3, 7.0])
     found = singular_integrals(x, rings)[0] @ np.ones(rings.size)
     outside = np.maximum(x, 1.0)
@@ -30,7 +30,7 @@ def test_a_disc_of_pressure_presses_as_love_found(rings) -> None:
 
 
 @pytest.mark.parametrize("rings", [EVEN, CROWDED], ids=["even", "crowded"])
-def test_a_linear_outward_traction_is_integrated_as_adaptive_quadrature_does(rings) -> None:
+def test_a_linear_outward_traction_is_integrated_as_adaptive_quadrature_does(rings):
     def kernel(s: float, x: float) -> float:
         m = min(x, s) / max(x, s)
         return 2 / np.pi * (ellipk(m**2) - ellipe(m**2)) / min(x, s)
@@ -42,7 +42,7 @@ def test_a_linear_outward_traction_is_integrated_as_adaptive_quadrature_does(rin
         assert found[0] == pytest.approx(exact, rel=1e-8)
 
 
-def test_the_coupling_is_elementary() -> None:
+def test_the_coupling_is_elementary():
     x = np.array([0.0, 0.013, 0.5, 1.0, 3.0])
     beyond, within = coupling_integrals(x, EVEN)
     inside = np.minimum(x, 1.0)
@@ -52,7 +52,7 @@ def test_the_coupling_is_elementary() -> None:
     assert np.all(singular_integrals(np.zeros(1), EVEN)[1] == 0)  # on the axis nothing moves aside
 
 
-def test_the_transforms_of_the_hats_sum_to_those_of_simple_tractions() -> None:
+def test_the_transforms_of_the_hats_sum_to_those_of_simple_tractions():
     k = np.array([0.3, 2.0, 11.0, 40.0])
     of_pressure, of_shear = (hat_transform(EVEN.tobytes(), k.tobytes(), n) for n in (0, 1))
     np.testing.assert_allclose(of_pressure @ np.ones(41), j1(k) / k, rtol=1e-12)

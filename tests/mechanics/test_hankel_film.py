@@ -12,7 +12,7 @@ from memscal.mechanics.film_response import HankelField, HankelFilm
 
 
 @pytest.mark.parametrize("nu", [0.0, 0.3, 0.495, 0.5])
-def test_the_compliance_is_reciprocal(nu) -> None:
+def test_the_compliance_is_reciprocal(nu):
     # Betti: what one pair of tractions does along the other is what the other does along it.
     rng = np.random.default_rng()
     rings = np.linspace(0.0, 4e-3, 13)
@@ -32,7 +32,7 @@ def test_the_compliance_is_reciprocal(nu) -> None:
 
 @pytest.mark.parametrize("nu", [0.2, 0.5])
 @pytest.mark.parametrize("sticking", [False, True])
-def test_the_surface_meets_a_rod_all_the_way_to_its_edge(nu, sticking) -> None:
+def test_the_surface_meets_a_rod_all_the_way_to_its_edge(nu, sticking):
     contact = indent(film(nu), Rod(radius=1e-3), load=1.0, friction=math.inf if sticking else 0.0)
     r = np.linspace(0.0, 0.95e-3, 20)
     np.testing.assert_allclose(contact.surface_depression(r), contact.depth, rtol=2e-4)
@@ -44,7 +44,7 @@ def test_the_surface_meets_a_rod_all_the_way_to_its_edge(nu, sticking) -> None:
         assert np.max(np.abs(contact.surface_outward(r))) < 2e-4 * contact.depth
 
 
-def test_an_incompressible_film_keeps_its_volume() -> None:
+def test_an_incompressible_film_keeps_its_volume():
     contact = indent(film(0.5), Rod(radius=1e-3), load=1.0)
     # Inside and outside the edge apart: the surface bends sharply there.
     inside, w_in = gauss_panels(1e-3, 0.05e-3)

@@ -21,7 +21,7 @@ def press(nu: float, friction: float, radius: float = 0.25e-3) -> Contact:
 
 
 @pytest.mark.parametrize("friction", [0.0, math.inf])
-def test_the_spectrum_is_the_fourier_transform_of_the_base_stress(friction) -> None:
+def test_the_spectrum_is_the_fourier_transform_of_the_base_stress(friction):
     contact = indent(FILM, ROD, load=0.5, friction=friction)
     k = np.array([[0.0, 300.0, 700.0], [1500.0, 3000.0, 1e6]])
     r, weights = gauss_panels(80e-3, 2e-3)
@@ -37,20 +37,20 @@ def test_the_spectrum_is_the_fourier_transform_of_the_base_stress(friction) -> N
     )
 
 
-def test_the_rod_of_the_paper_sinks_as_deep_as_the_linear_model_says() -> None:
+def test_the_rod_of_the_paper_sinks_as_deep_as_the_linear_model_says():
     contact = indent(FILM, ROD, load=1.0)
     assert contact.depth == pytest.approx(0.587e-3, rel=1e-3)
     assert contact.load / contact.depth == pytest.approx(1704, rel=5e-4)
 
 
-def test_friction_changes_the_stress_under_the_paper_s_rod_by_a_thousandth() -> None:
+def test_friction_changes_the_stress_under_the_paper_s_rod_by_a_thousandth():
     r = np.linspace(0.0, 8e-3, 400)
     sliding = indent(FILM, ROD, load=1.0).base_stress(r)
     sticking = indent(FILM, ROD, load=1.0, friction=math.inf).base_stress(r)
     assert 0.5e-3 < np.max(np.abs(sticking - sliding)) / np.max(sliding) < 2e-3
 
 
-def test_a_list_of_loads_gives_proportional_contacts() -> None:
+def test_a_list_of_loads_gives_proportional_contacts():
     one, three = indent(FILM, ROD, load=[0.25, 0.75])
     assert three.depth == pytest.approx(3 * one.depth, rel=1e-14)
     assert [c.load for c in indent(FILM, ROD, load=np.array([0.25, 0.75]))] == [0.25, 0.75]
@@ -58,7 +58,7 @@ def test_a_list_of_loads_gives_proportional_contacts() -> None:
 
 
 @pytest.mark.parametrize("friction", [0.0, math.inf])
-def test_there_is_no_traction_outside_the_rod_and_no_nan_anywhere(friction) -> None:
+def test_there_is_no_traction_outside_the_rod_and_no_nan_anywhere(friction):
     contact = indent(FILM, ROD, load=1.0, friction=friction)
     r = np.array([[0.0, 0.1e-3], [ROD.radius, 1.0]])
     at_interface = (contact.interface_pressure(r), contact.interface_shear(r))
@@ -70,14 +70,14 @@ def test_there_is_no_traction_outside_the_rod_and_no_nan_anywhere(friction) -> N
 
 
 @pytest.mark.parametrize("r", [[-1e-3], [np.nan], [np.inf]])
-def test_what_is_no_radius_is_refused(r) -> None:
+def test_what_is_no_radius_is_refused(r):
     with pytest.raises(InputError, match="radius"):
         indent(FILM, ROD, load=1.0).base_stress(r)
 
 
 @pytest.mark.parametrize("radius", [0.1e-3, 4e-3])
 @pytest.mark.parametrize(("nu", "friction"), CASES)
-def test_a_spline_through_the_profile_is_the_stress(nu, friction, radius) -> None:
+def test_a_spline_through_the_profile_is_the_stress(nu, friction, radius):
     contact = press(nu, friction, radius)
     profile = contact.profile()
     between = (profile.r[1:] + profile.r[:-1]) / 2
@@ -90,7 +90,7 @@ def test_a_spline_through_the_profile_is_the_stress(nu, friction, radius) -> Non
 
 @pytest.mark.parametrize("value", [0.0, -1.0, np.nan, np.inf])
 @pytest.mark.parametrize("name", ["load", "depth"])
-def test_loads_and_depths_that_are_not_positive_are_refused(name, value) -> None:
+def test_loads_and_depths_that_are_not_positive_are_refused(name, value):
     asked = (value, None) if name == "load" else (None, value)
     with pytest.raises(InputError, match=f"{name} is .* above zero"):
         indent(FILM, ROD, load=asked[0], depth=asked[1])
@@ -105,7 +105,7 @@ def test_loads_and_depths_that_are_not_positive_are_refused(name, value) -> None
         ({"load": 10.0}, DomainError, "sink"),
     ],
 )
-def test_a_load_or_a_depth_within_the_film_is_needed(asked, error, words) -> None:
+def test_a_load_or_a_depth_within_the_film_is_needed(asked, error, words):
     with pytest.raises(error, match=words):
         indent(FILM, ROD, **asked)
 
@@ -121,6 +121,6 @@ def test_a_load_or_a_depth_within_the_film_is_needed(asked, error, words) -> Non
         ({"rings": 3}, "at least 16"),
     ],
 )
-def test_what_makes_no_sense_is_refused_in_plain_words(wrong, message) -> None:
+def test_what_makes_no_sense_is_refused_in_plain_words(wrong, message):
     with pytest.raises(InputError, match=message):
         indent(FILM, Sphere(radius=0.1288), load=1.0, **wrong)

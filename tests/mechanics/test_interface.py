@@ -22,7 +22,7 @@ def press(interface: Interface | None = None, load: float = 1.37, mu: float = 0.
 
 
 @pytest.mark.parametrize("separation", [-60.0, -25.0, -19.0, -3.0, 0.0, 2.5, 7.0])
-def test_the_pressure_is_the_sum_over_gaussian_asperities(separation) -> None:
+def test_the_pressure_is_the_sum_over_gaussian_asperities(separation):
     law = GreenwoodTripp(roughness=2.0, asperity_density=3.0, asperity_radius=4.0)
 
     def density(s: float) -> float:
@@ -35,7 +35,7 @@ def test_the_pressure_is_the_sum_over_gaussian_asperities(separation) -> None:
 
 
 @pytest.mark.parametrize("law", [GREENWOOD_TRIPP, EXPONENTIAL], ids=["GT", "exponential"])
-def test_a_law_its_inverse_and_its_slope_belong_together(law) -> None:
+def test_a_law_its_inverse_and_its_slope_belong_together(law):
     separation = np.linspace(-3e-6, 6e-6, 40)
     pressure = law.pressure(separation, FILM)
     np.testing.assert_allclose(law.separation(pressure, FILM), separation, atol=1e-13)
@@ -53,7 +53,7 @@ def test_a_law_its_inverse_and_its_slope_belong_together(law) -> None:
     ],
     ids=["GT", "exponential"],
 )
-def test_the_rigid_contact_returns_as_the_roughness_vanishes(rough, mu) -> None:
+def test_the_rigid_contact_returns_as_the_roughness_vanishes(rough, mu):
     smooth = press(mu=mu)
     nearly = press(Interface(normal=rough), mu=mu)
     assert nearly.depth == pytest.approx(smooth.depth, rel=5e-4)
@@ -63,7 +63,7 @@ def test_the_rigid_contact_returns_as_the_roughness_vanishes(rough, mu) -> None:
     assert np.max(np.abs(difference)) < 5e-4 * smooth.max_base_stress
 
 
-def test_zero_compliances_are_the_rigid_interface_itself() -> None:
+def test_zero_compliances_are_the_rigid_interface_itself():
     law = GreenwoodTripp(roughness=0.0, asperity_density=1e9, asperity_radius=1e-5)
     none = Interface(normal=law)
     assert none.rigid
@@ -71,7 +71,7 @@ def test_zero_compliances_are_the_rigid_interface_itself() -> None:
 
 
 @pytest.mark.parametrize("law", [GREENWOOD_TRIPP, EXPONENTIAL], ids=["GT", "exponential"])
-def test_every_point_of_a_rough_contact_obeys_the_law(law) -> None:
+def test_every_point_of_a_rough_contact_obeys_the_law(law):
     contact = press(Interface(normal=law), mu=0.2)
     r = contact.traction.rings
     separation = SPHERE.height(r) - contact.depth + contact.surface_depression(r)
@@ -79,7 +79,7 @@ def test_every_point_of_a_rough_contact_obeys_the_law(law) -> None:
     np.testing.assert_allclose(pressure, law.pressure(separation, FILM), atol=1e-7 * pressure.max())
 
 
-def test_a_wide_rough_contact_under_a_rod_is_a_layer_over_the_film() -> None:
+def test_a_wide_rough_contact_under_a_rod_is_a_layer_over_the_film():
     # A stiff film, so that the interface alone yields: pressure P / (pi a^2) everywhere.
     stiff = ElasticFilm(young_modulus=2.2e11, poisson_ratio=0.3, thickness=2e-3)
     law = ExponentialCompliance(decay_length=1e-6, reference_pressure=1e6)
@@ -90,7 +90,7 @@ def test_a_wide_rough_contact_under_a_rod_is_a_layer_over_the_film() -> None:
     assert contact.depth == pytest.approx(depth, abs=2e-8)
 
 
-def test_a_slip_length_lowers_the_friction_that_a_contact_seems_to_have() -> None:
+def test_a_slip_length_lowers_the_friction_that_a_contact_seems_to_have():
     depths = [
         press(Interface(slip_length=length), mu=1.6).depth
         for length in (1e-10, ROUGHNESS, 10 * ROUGHNESS, 1.0)
@@ -100,7 +100,7 @@ def test_a_slip_length_lowers_the_friction_that_a_contact_seems_to_have() -> Non
     assert depths[-1] == pytest.approx(press(mu=0.0).depth, rel=1e-5)
 
 
-def test_the_shear_follows_the_elastic_stretch_up_to_the_slip_length() -> None:
+def test_the_shear_follows_the_elastic_stretch_up_to_the_slip_length():
     mu = 0.5
     length = 3e-6
     contact = indent(
@@ -119,7 +119,7 @@ def test_the_shear_follows_the_elastic_stretch_up_to_the_slip_length() -> None:
     np.testing.assert_allclose(contact.interface_shear(r), expected, atol=5e-3 * scale)
 
 
-def test_a_path_through_a_compliant_interface_loses_work_in_every_cycle() -> None:
+def test_a_path_through_a_compliant_interface_loses_work_in_every_cycle():
     contacts = indent(
         FILM,
         SPHERE,
@@ -146,6 +146,6 @@ def test_a_path_through_a_compliant_interface_loses_work_in_every_cycle() -> Non
         ),
     ],
 )
-def test_laws_that_make_no_sense_are_refused(make, message) -> None:
+def test_laws_that_make_no_sense_are_refused(make, message):
     with pytest.raises(InputError, match=message):
         make()

@@ -28,11 +28,11 @@ RUBBER = replace(FILM, law="neo-hookean")
         pytest.param(0.485, 0.06, [0.03], False, marks=FULL),
     ],
 )
-def test_a_tabulated_rod_is_that_which_is_solved(nu, radius, depths, sticking) -> None:
+def test_a_tabulated_rod_is_that_which_is_solved(nu, radius, depths, sticking):
     compare_with_the_table(nu, radius, depths, sticking=sticking)
 
 
-def test_the_table_ends_where_it_says() -> None:
+def test_the_table_ends_where_it_says():
     end = largest_tabulated_load(RUBBER, ROD, sticking=True)
     assert tabulated_rod(RUBBER, ROD, end * 0.999, sticking=True).depth < 0.45 * RUBBER.thickness
     assert tabulated_rod(RUBBER, ROD, end * 1.001, sticking=True) is None

@@ -10,14 +10,14 @@ ROOT = Path(__file__).parents[2]
 DECLARED = re.compile(r"\b(?:check|_reduced|_added|_tested)\(\s*f?\"(\w+?)(?:_?\{(\w*)|\")")
 
 
-def test_every_check_that_is_declared_is_explained() -> None:
+def test_every_check_that_is_declared_is_explained():
     sources = (path.read_text() for path in Path(memscal.__path__[0]).rglob("*.py"))
     names = {match[1] for source in sources for match in DECLARED.finditer(source)}
     assert len(names) > 25
     assert names - EXPLANATIONS.keys() - {"held_out"} == set()
 
 
-def test_the_documentation_explains_checks_in_the_same_words() -> None:
+def test_the_documentation_explains_checks_in_the_same_words():
     rows = (ROOT / "docs" / "quality.md").read_text(encoding="utf-8").splitlines()
     cells = [[cell.strip() for cell in row.split("|")[1:-1]] for row in rows if "| `" in row]
     assert {row[0].strip("`"): (row[1], row[3]) for row in cells} == EXPLANATIONS

@@ -19,7 +19,7 @@ def parts(**changes: Any) -> dict[str, Any]:
     }
 
 
-def test_a_field_mesh_keeps_its_own_read_only_copy() -> None:
+def test_a_field_mesh_keeps_its_own_read_only_copy():
     stress = np.ones((3, 4))
     mesh = FieldMesh(**parts(stress=stress))
     stress[0, 0] = 7.0
@@ -39,6 +39,6 @@ def test_a_field_mesh_keeps_its_own_read_only_copy() -> None:
         ({"triangles": [[-1, 1, 2]]}, "outside 0 to 2"),
     ],
 )
-def test_a_field_mesh_refuses_parts_that_do_not_fit(changes: Any, message: str) -> None:
+def test_a_field_mesh_refuses_parts_that_do_not_fit(changes, message):
     with pytest.raises(InputError, match=message):
         FieldMesh(**parts(**changes))

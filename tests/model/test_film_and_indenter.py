@@ -4,7 +4,6 @@ import math
 import re
 import warnings
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -17,7 +16,7 @@ from memscal.errors import InputError
 
 
 @given(nu=st.floats(0.0, 0.5), modulus=st.floats(1e3, 1e12))
-def test_the_moduli_are_those_of_isotropic_elasticity(nu: float, modulus: float) -> None:
+def test_the_moduli_are_those_of_isotropic_elasticity(nu, modulus):
     film = replace(FILM, poisson_ratio=nu, young_modulus=modulus)
     # E = 2 G (1 + nu), and the plane-strain modulus is 2 G/(1 - nu).
     assert 2 * film.shear_modulus * (1 + nu) == pytest.approx(modulus)
@@ -37,14 +36,14 @@ def test_the_moduli_are_those_of_isotropic_elasticity(nu: float, modulus: float)
     ({"thickness_uncertainty": float("inf")}, "uncertainty of film thickness"),
     ({"roughness_rms_uncertainty": -1e-9}, "uncertainty of film roughness_rms"),
 ])  # fmt: skip
-def test_a_film_that_cannot_be_is_refused_by_name(changes: dict[str, Any], named: str) -> None:
+def test_a_film_that_cannot_be_is_refused_by_name(changes, named):
     with pytest.raises(InputError, match=named):
         replace(FILM, **changes)
 
 
 @pytest.mark.parametrize("radius", [0.0, -1e-3, float("nan"), float("inf")])
 @pytest.mark.parametrize("kind", [Rod, Sphere])
-def test_an_indenter_without_a_radius_is_refused_by_its_shape(kind, radius) -> None:
+def test_an_indenter_without_a_radius_is_refused_by_its_shape(kind, radius):
     with pytest.raises(InputError, match=f"{kind.__name__.lower()} radius"):
         kind(radius=radius)
     with pytest.raises(InputError, match=f"uncertainty of the {kind.__name__.lower()} radius"):
@@ -54,12 +53,12 @@ def test_an_indenter_without_a_radius_is_refused_by_its_shape(kind, radius) -> N
 R = np.linspace(0.0, 2e-3, 50)
 
 
-def test_a_rod_is_flat_to_its_edge_and_ends_there() -> None:
+def test_a_rod_is_flat_to_its_edge_and_ends_there():
     height = Rod(radius=1e-3).height([0.0, 1e-3, 1.001e-3])
     np.testing.assert_array_equal(height, [0.0, 0.0, np.inf])
 
 
-def test_a_sphere_is_round() -> None:
+def test_a_sphere_is_round():
     sphere = Sphere(radius=5e-3)
     np.testing.assert_allclose(R**2 + (5e-3 - sphere.height(R)) ** 2, 25e-6, rtol=1e-14)
     assert sphere.height(5.1e-3) == np.inf
@@ -67,19 +66,19 @@ def test_a_sphere_is_round() -> None:
     assert Sphere(radius=1e6).height(1e-3) == pytest.approx(0.5e-12, rel=1e-12)
 
 
-def test_a_cone_rises_by_its_inclination() -> None:
+def test_a_cone_rises_by_its_inclination():
     cone = Cone(inclination=math.atan(0.25))
     np.testing.assert_allclose(cone.height(R), R / 4, rtol=1e-14)
     assert cone.extent == math.inf
 
 
 @pytest.mark.parametrize("inclination", [0.0, -0.1, math.pi / 2, math.nan])
-def test_a_cone_is_neither_flat_nor_a_needle(inclination: float) -> None:
+def test_a_cone_is_neither_flat_nor_a_needle(inclination):
     with pytest.raises(InputError, match="inclination"):
         Cone(inclination=inclination)
 
 
-def test_a_profile_goes_through_its_table_and_nowhere_else() -> None:
+def test_a_profile_goes_through_its_table_and_nowhere_else():
     profile = Profile(r=[0.0, 1e-3, 2e-3, 3e-3], z=[0.0, 0.0, 4e-6, 9e-6])
     np.testing.assert_allclose(profile.height(profile.r), profile.z, atol=1e-20)
     # A flat stays flat: a monotone spline does not swing below it.
@@ -101,7 +100,7 @@ def test_a_profile_goes_through_its_table_and_nowhere_else() -> None:
     ([0.0, 1.0, 2.0], [0.0, 1.0, 2.0], "four or more"),
     ([0.0, 1.0, 2.0, 3.0], [0.0, 1.0, 2.0], "3 heights"),
 ])  # fmt: skip
-def test_a_profile_that_cannot_touch_is_refused(r, z, message) -> None:
+def test_a_profile_that_cannot_touch_is_refused(r, z, message):
     with pytest.raises(InputError, match=f"(?i){message}"):
         Profile(r=r, z=z)
 
@@ -116,7 +115,7 @@ def test_a_profile_that_cannot_touch_is_refused(r, z, message) -> None:
         (2.2e6, 2.0, ""),  # a half-space
     ],
 )
-def test_a_film_in_millimetres_and_megapascals_is_warned_of(modulus, thickness, meant) -> None:
+def test_a_film_in_millimetres_and_megapascals_is_warned_of(modulus, thickness, meant):
     with warnings.catch_warnings(record=True) as seen:
         warnings.simplefilter("always")
         replace(FILM, young_modulus=modulus, thickness=thickness)
@@ -126,7 +125,7 @@ def test_a_film_in_millimetres_and_megapascals_is_warned_of(modulus, thickness, 
 
 
 @pytest.mark.parametrize("nu", [0.5, 0.497, 0.3, 0.0])
-def test_the_expected_poissons_ratio_is_that_of_draws_that_a_film_can_have(nu: float) -> None:
+def test_the_expected_poissons_ratio_is_that_of_draws_that_a_film_can_have(nu):
     film = replace(FILM, poisson_ratio=nu, poisson_ratio_uncertainty=0.004)
     draws = np.random.default_rng(1).normal(nu, 0.004, 400_000)
     draws = draws[(draws >= 0) & (draws <= 0.5)]

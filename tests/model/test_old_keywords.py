@@ -23,7 +23,7 @@ class Units:
     unit: str = "V"
 
 
-def test_old_keywords_change_the_records_that_hold_them_and_are_warned_of() -> None:
+def test_old_keywords_change_the_records_that_hold_them_and_are_warned_of():
     with pytest.warns(DeprecationWarning, match="becomes") as caught:
         noise, units = with_old_keywords(
             "scan",
@@ -37,12 +37,12 @@ def test_old_keywords_change_the_records_that_hold_them_and_are_warned_of() -> N
     assert caught[0].filename == __file__
 
 
-def test_without_old_keywords_nothing_is_said() -> None:
+def test_without_old_keywords_nothing_is_said():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert with_old_keywords("scan", {}, noise=Noise()) == [Noise()]
 
 
-def test_a_keyword_that_never_was_is_refused_as_python_does() -> None:
+def test_a_keyword_that_never_was_is_refused_as_python_does():
     with pytest.raises(TypeError, match=r"scan\(\) got an unexpected keyword argument 'colour'"):
         with_old_keywords("scan", {"colour": "red"}, noise=Noise())

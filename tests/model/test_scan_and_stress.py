@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from memscal.errors import InputError
 
 
-def test_a_line_that_is_repeated_once_is_still_repeats() -> None:
+def test_a_line_that_is_repeated_once_is_still_repeats():
     scan = make_scan("repeats")
     one = slice(0, 1)
     single = replace(
@@ -58,12 +58,12 @@ def test_a_line_that_is_repeated_once_is_still_repeats() -> None:
         ("line", {"lubricant": "glycerol"}, "'glycerol'.*is not stated"),
     ],
 )
-def test_a_scan_that_contradicts_itself_is_refused(kind, changes, problem) -> None:
+def test_a_scan_that_contradicts_itself_is_refused(kind, changes, problem):
     with pytest.raises(InputError, match=problem):
         make_scan(kind, **changes)
 
 
-def test_a_scan_keeps_its_own_copy_of_its_data() -> None:
+def test_a_scan_keeps_its_own_copy_of_its_data():
     x = np.linspace(-1e-3, 1e-3, 33)
     u = np.ones(33)
     shear = np.ones(33)
@@ -93,7 +93,7 @@ def test_a_scan_keeps_its_own_copy_of_its_data() -> None:
         ({"r": 1.0}, r"r of the stress profile has shape \(\)"),
     ],
 )
-def test_a_profile_that_contradicts_itself_is_refused(changes, problem) -> None:
+def test_a_profile_that_contradicts_itself_is_refused(changes, problem):
     with pytest.raises(InputError, match=problem):
         make_profile(**changes)
 
@@ -104,7 +104,7 @@ def test_a_profile_that_contradicts_itself_is_refused(changes, problem) -> None:
     axis=st.booleans(),
     curvature=st.floats(-0.9, 2.0),
 )
-def test_the_force_of_uneven_radii_is_exact_where_a_spline_is(seed, count, axis, curvature) -> None:
+def test_the_force_of_uneven_radii_is_exact_where_a_spline_is(seed, count, axis, curvature):
     """A stress a + b r^2 makes sigma r an odd cubic, which the mirrored spline is."""
     steps = np.random.default_rng(seed).uniform(0.05, 1.0, count)
     r = np.cumsum(steps) - (steps[0] if axis else 0.0)
@@ -113,7 +113,7 @@ def test_the_force_of_uneven_radii_is_exact_where_a_spline_is(seed, count, axis,
     assert profile.force == pytest.approx(np.pi * reach**2 * (1.0 + curvature / 2), rel=1e-9)
 
 
-def test_a_single_radius_carries_the_force_of_an_even_pressure_or_none() -> None:
+def test_a_single_radius_carries_the_force_of_an_even_pressure_or_none():
     even = make_profile(r=[2e-3], sigma_zz=[1e5], sigma_rz=None)
     assert even.force == pytest.approx(np.pi * 4e-6 * 1e5)
     assert make_profile(r=[0.0], sigma_zz=[1e5], sigma_rz=None).force == 0.0

@@ -1,10 +1,8 @@
 """Every report and a certificate in a browser: alone, silent, accessible, and whole on paper."""
 
 import re
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -59,7 +57,7 @@ def reports(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 
 @pytest.mark.parametrize(("width", "scheme"), [(1100, "light"), (380, "dark")])
 @pytest.mark.parametrize("kind", KINDS)
-def test_axe_finds_no_violation(reports, opened: Callable[..., Any], axe, kind, width, scheme):
+def test_axe_finds_no_violation(reports, opened, axe, kind, width, scheme):
     viewport = {"width": width, "height": 900}
     page = opened(reports[kind], viewport=viewport, color_scheme=scheme)
     assert page.evaluate("document.documentElement.scrollWidth") <= width
@@ -67,7 +65,7 @@ def test_axe_finds_no_violation(reports, opened: Callable[..., Any], axe, kind, 
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_nothing_is_cut_on_a4(reports, opened: Callable[..., Any], kind):
+def test_nothing_is_cut_on_a4(reports, opened, kind):
     assert reports[kind].stat().st_size < 1_000_000
     page = opened(reports[kind], viewport=PAPER, color_scheme="dark")
     assert cut(page) == []
@@ -86,7 +84,7 @@ def test_a_certificate_is_accessible_and_prints_on_two_sheets(reports, opened, a
     assert len(re.findall(rb"/Type\s*/Page\b", page.pdf(prefer_css_page_size=True))) == 2
 
 
-def test_every_figure_is_drawn(reports, opened: Callable[..., Any]):
+def test_every_figure_is_drawn(reports, opened):
     sizes = "[...document.images].map(i => [i.naturalWidth, i.alt.length])"
     for path in reports.values():
         images = np.array(opened(path).evaluate(sizes))

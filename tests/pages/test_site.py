@@ -45,9 +45,7 @@ def faults(browser: Any, path: Path, scheme: str, axe: str) -> list[str]:
     return found
 
 
-def test_pages_are_accessible_load_nothing_from_outside_and_fit_their_window(
-    site: Path, browser: Any, axe: str
-) -> None:
+def test_pages_are_accessible_load_nothing_from_outside_and_fit_their_window(site, browser, axe):
     pages = {path.relative_to(site).with_suffix("").as_posix() for path in site.rglob("*.html")}
     made = {page for page in pages if page.startswith("docs/api/")}
     written = {page for page in pages - made - {"index"} if not page.startswith("_static/")}
@@ -60,7 +58,7 @@ def test_pages_are_accessible_load_nothing_from_outside_and_fit_their_window(
     assert {each: wrong for each, wrong in found.items() if wrong} == {}
 
 
-def test_the_top_leads_to_the_start_page_and_the_search_finds_a_check(site, browser) -> None:
+def test_the_top_leads_to_the_start_page_and_the_search_finds_a_check(site, browser):
     page = browser.new_page()
     page.goto((site / "index.html").as_uri())
     page.wait_for_url("**/docs/index.html")
@@ -68,7 +66,7 @@ def test_the_top_leads_to_the_start_page_and_the_search_finds_a_check(site, brow
     page.wait_for_selector("#search-results a[href*='quality']")
 
 
-def test_commands_are_shown_as_they_are_typed(site: Path) -> None:
+def test_commands_are_shown_as_they_are_typed(site):
     typed = []
     for path in site.rglob("*.html"):
         page = path.read_text(encoding="utf-8")

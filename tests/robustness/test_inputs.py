@@ -143,7 +143,7 @@ USED: dict[str, tuple[str, ...]] = {
 
 @drawn(8, 30_000)
 @given(kind=st.sampled_from(sorted(USED)), changes=BYTES)
-def test_damaged_bytes_are_read_or_refused(good, folder, kind, changes) -> None:
+def test_damaged_bytes_are_read_or_refused(good, folder, kind, changes):
     survives(folder, change_bytes(good[kind], changes), *USED[kind])
 
 
@@ -175,20 +175,20 @@ CORPUS = (
 
 @pytest.mark.parametrize(("kind", "edit"), CORPUS)
 @pytest.mark.parametrize("digest", [True, False] if SHARE else [True])
-def test_inputs_that_once_failed_are_read_or_refused(good, folder, kind, edit, digest) -> None:
+def test_inputs_that_once_failed_are_read_or_refused(good, folder, kind, edit, digest):
     survives(folder, edit_hdf5(good[kind], [edit], digest=digest), *USED[kind])
 
 
 @drawn(8, 50_000)
 @given(kind=st.sampled_from(sorted(USED)), edits=EDITS, digest=st.booleans())
-def test_edited_values_are_read_or_refused(good, folder, kind, edits, digest) -> None:
+def test_edited_values_are_read_or_refused(good, folder, kind, edits, digest):
     data = edit_hdf5(good[kind], edits, digest=digest)
     survives(folder, data, *USED[kind])
 
 
 @drawn(12, 19_000)
 @given(changes=st.one_of(TABLE, BYTES))
-def test_damaged_tables_are_read_or_refused(good, folder, changes) -> None:
+def test_damaged_tables_are_read_or_refused(good, folder, changes):
     change = change_table if type(changes[0]).__name__ == "CellChange" else change_bytes
     run = "import in.csv -o out.h5 --x x --u u_zz --load 1"
     survives(folder, change(good["table"], changes), run, name="in.csv")
@@ -196,7 +196,7 @@ def test_damaged_tables_are_read_or_refused(good, folder, changes) -> None:
 
 @drawn(1, 1000)
 @given(changes=st.one_of(BYTES, TABLE))
-def test_damaged_meshes_are_read_or_refused(good, folder, changes) -> None:
+def test_damaged_meshes_are_read_or_refused(good, folder, changes):
     # Each is read by a process of its own.
     change = change_table if type(changes[0]).__name__ == "CellChange" else change_bytes
     reference = "--format reference --r-unit mm --sigma S --sigma-unit MPa --load 1"

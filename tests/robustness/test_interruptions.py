@@ -76,9 +76,7 @@ def interrupted(folder: Path, number: signal.Signals, delay: float) -> tuple[int
     return process.returncode, said
 
 
-def test_a_killed_run_leaves_whole_outputs_or_none_and_the_next_clears_up(
-    folder: Path, seed: int, whole: float
-) -> None:
+def test_a_killed_run_leaves_whole_outputs_or_none_and_the_next_clears_up(folder, seed, whole):
     draw = random.Random(seed)
     for _ in range(number(2, 250)):
         code, _ = interrupted(folder, signal.SIGKILL, draw.uniform(0, 1.1 * whole))
@@ -100,9 +98,7 @@ def test_a_killed_run_leaves_whole_outputs_or_none_and_the_next_clears_up(
     assert {*names(folder)} == OUTPUTS | {"scan.h5"}
 
 
-def test_a_run_that_is_told_to_end_says_so_and_leaves_nothing(
-    folder: Path, seed: int, whole: float
-) -> None:
+def test_a_run_that_is_told_to_end_says_so_and_leaves_nothing(folder, seed, whole):
     draw = random.Random(seed)
     for _ in range(number(1, 84)):
         for sent, expected in list(CODES.items())[:: 1 if SHARE else 2]:
@@ -134,7 +130,7 @@ def full_disk(folder: Path, size: int) -> Iterator[Path]:
 
 
 @pytest.mark.parametrize("kibibytes", [4, 64, 300, 800] if SHARE else [4, 300])
-def test_a_disk_that_fills_leaves_what_was_there(folder: Path, kibibytes: int) -> None:
+def test_a_disk_that_fills_leaves_what_was_there(folder, kibibytes):
     with full_disk(folder, kibibytes * 1024) as disk:
         old = b"what was there"
         (disk / "out.h5").write_bytes(old)
@@ -147,7 +143,7 @@ def test_a_disk_that_fills_leaves_what_was_there(folder: Path, kibibytes: int) -
         assert (disk / "out.h5").read_bytes() == old
 
 
-def test_no_flipped_bit_of_a_file_goes_unnoticed(tmp_path: Path, seed: int) -> None:
+def test_no_flipped_bit_of_a_file_goes_unnoticed(tmp_path, seed):
     draw = random.Random(seed)
     write_artifact(make_artifact(), tmp_path / "artifact.h5")
     write_scan(make_scan(), tmp_path / "scan.h5")

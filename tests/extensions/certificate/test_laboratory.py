@@ -46,7 +46,7 @@ def written(folder: Path, text: str) -> Path:
         ("[sensor\n", "no TOML"),
     ],
 )
-def test_what_a_file_may_not_hold_is_refused_by_name(tmp_path, text: str, words: str):
+def test_what_a_file_may_not_hold_is_refused_by_name(tmp_path, text, words):
     with pytest.raises(MemscalError) as refusal:
         read_laboratory(written(tmp_path, text))
     assert words in str(refusal.value)

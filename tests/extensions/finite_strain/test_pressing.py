@@ -36,7 +36,7 @@ def pressed_rods(request: pytest.FixtureRequest) -> tuple[Contact, ...]:
 
 
 @pytest.mark.parametrize("stretch", [0.5, 1.6])
-def test_a_free_cylinder_is_compressed_as_the_closed_form_says(stretch: float):
+def test_a_free_cylinder_is_compressed_as_the_closed_form_says(stretch):
     elements = cylinder()
     G = elements.material.shear_modulus
     R, Z = elements.nodes
@@ -57,7 +57,7 @@ def test_a_free_cylinder_is_compressed_as_the_closed_form_says(stretch: float):
 
 
 @pytest.mark.parametrize(("nu", "ratio"), [(0.0, None), (0.3, 0.7), (0.5, None), (0.5, 0.3)])
-def test_the_tangent_is_the_derivative_of_the_forces(nu: float, ratio: float | None):
+def test_the_tangent_is_the_derivative_of_the_forces(nu, ratio):
     elements = cylinder(nu, ratio)
     wave = np.sin(np.arange(elements.size) * 1.7)
     x = 0.03 * wave
@@ -80,7 +80,7 @@ def test_the_forces_are_the_derivative_of_the_energy_of_an_incompressible_film(r
 
 
 @pytest.mark.parametrize("ratio", [0.0, 0.5, 2.0])
-def test_simple_shear_of_a_mooney_rivlin_film_is_the_closed_form(ratio: float):
+def test_simple_shear_of_a_mooney_rivlin_film_is_the_closed_form(ratio):
     rubber = Rubber.of(film_of(ratio=ratio))
     gamma = 0.8
     F = np.array([1.0, gamma, 0.0, 1.0, 1.0])
@@ -92,7 +92,7 @@ def test_simple_shear_of_a_mooney_rivlin_film_is_the_closed_form(ratio: float):
 
 
 @pytest.mark.parametrize(("nu", "sticking"), [(0.3, False), (0.5, False), (0.5, True)])
-def test_a_lightly_pressed_sphere_is_that_of_the_linear_model(nu: float, sticking: bool):
+def test_a_lightly_pressed_sphere_is_that_of_the_linear_model(nu, sticking):
     tip = {"sticking": sticking, "refinement": 0.6}
     (state,) = solve_finite_strain(film(nu), SPHERE, (Load(0.1),), **tip)
     friction = np.inf if sticking else 0.0
@@ -109,7 +109,7 @@ def test_a_lightly_pressed_sphere_is_that_of_the_linear_model(nu: float, stickin
 
 
 @pytest.mark.parametrize("sticking", [False, True])
-def test_a_hardly_pressed_rod_is_that_of_the_linear_model(sticking: bool):
+def test_a_hardly_pressed_rod_is_that_of_the_linear_model(sticking):
     # Only the flat part of its end touches then: a rod of that radius.
     (state,) = solve_finite_strain(
         FILM,
@@ -133,7 +133,7 @@ def test_a_hardly_pressed_rod_is_that_of_the_linear_model(sticking: bool):
     assert per_load == pytest.approx(shear, abs=0.02 * np.abs(shear).max())
 
 
-def test_the_base_carries_the_load(pressed_rods: tuple[Contact, ...]):
+def test_the_base_carries_the_load(pressed_rods):
     for state in pressed_rods:
         elements = state.inside.pressing.elements
         forces = elements.forces(state.inside.pressed.x)
@@ -154,12 +154,12 @@ def test_the_departure_of_the_base_stress_grows_linearly_at_first(pressed_rods):
     assert (heavy / light - 1) / (medium / light - 1) == pytest.approx(2.0, rel=0.25)
 
 
-def test_the_work_of_the_rod_is_the_energy_of_the_film(pressed_rods: tuple[Contact, ...]):
+def test_the_work_of_the_rod_is_the_energy_of_the_film(pressed_rods):
     last = pressed_rods[-1]
     assert last.work == pytest.approx(last.elastic_energy, rel=1e-3)
 
 
-def test_the_film_drapes_itself_around_the_rod(pressed_rods: tuple[Contact, ...]):
+def test_the_film_drapes_itself_around_the_rod(pressed_rods):
     deepest = pressed_rods[-1]
     r, depression, outward = deepest.inside.displacements
     moved = (r + outward) * 1e3

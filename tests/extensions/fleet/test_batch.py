@@ -298,7 +298,7 @@ def fleet_of(a: np.ndarray, sigma: np.ndarray, error: float | np.ndarray) -> Fle
 
 
 @pytest.mark.parametrize("count", [4, 8, 20, 100])
-def test_sensors_that_scatter_by_chance_are_no_outliers(count: int):
+def test_sensors_that_scatter_by_chance_are_no_outliers(count):
     rng = np.random.default_rng(count)
     batches = 400
     drawn = [rng.normal(1.0, 0.02, (2, count)) for _ in range(batches)]
@@ -338,6 +338,6 @@ def test_artifacts_are_those_of_the_rows(copy, run):
 
 
 @pytest.mark.parametrize("text", ["[" * 9000, '{"scans": 10, "shard_size": 1e9}', "{}"])
-def test_what_a_batch_states_of_itself_may_be_damaged(copy, run, text: str):
+def test_what_a_batch_states_of_itself_may_be_damaged(copy, run, text):
     (copy / "results" / "batch.json").write_text(text)
     run("summary", copy / "results").exits(0)

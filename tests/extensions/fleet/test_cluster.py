@@ -40,9 +40,7 @@ def pids(client: Client) -> dict[str, int]:
     return client.run(os.getpid)
 
 
-def test_scans_come_in_their_order_from_a_cluster_of_which_a_worker_is_killed(
-    workers: LocalCluster, scans
-):
+def test_scans_come_in_their_order_from_a_cluster_of_which_a_worker_is_killed(workers, scans):
     paths = sorted(scans.iterdir())
     with Client(workers) as client:
         executor: Executor = client.get_executor()
@@ -55,7 +53,7 @@ def test_scans_come_in_their_order_from_a_cluster_of_which_a_worker_is_killed(
     assert rest[-1].parameters["conversion_constant"] == pytest.approx(last.conversion_constant)
 
 
-def test_a_batch_outlives_a_worker_that_is_killed(workers: LocalCluster, scans, tmp_path, capsys):
+def test_a_batch_outlives_a_worker_that_is_killed(workers, scans, tmp_path, capsys):
     results = tmp_path / "results"
     address = workers.scheduler_address
     killed: list[int] = []

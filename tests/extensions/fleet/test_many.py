@@ -36,7 +36,7 @@ EXECUTORS: dict[str, Callable[[], AbstractContextManager[Executor | None]]] = {
 
 
 @pytest.mark.parametrize("kind", EXECUTORS)
-def test_every_scan_says_what_it_says_by_itself_and_a_bad_one_why(kind: str, tmp_path):
+def test_every_scan_says_what_it_says_by_itself_and_a_bad_one_why(kind, tmp_path):
     good = [replace(scan, channels={"u_xz": scan.u_zz}) for scan in scans(3)]
     flat = replace(good[0], u_zz=np.zeros_like(good[0].u_zz))
     given = [good[0], flat, good[1], tmp_path / "missing.h5", good[2]]

@@ -51,7 +51,7 @@ def relative_uncertainty(length: float, precision: Precision) -> float:
 
 
 @pytest.mark.parametrize("length", [7e-6, 50e-6])
-def test_a_slip_length_is_found_where_it_is_the_truth(length: float):
+def test_a_slip_length_is_found_where_it_is_the_truth(length):
     found = weighed("slipping", length)
     assert found.yielding_preferred
     assert all(factor.favoured == found.laws[-1].name for factor in found.factors)
@@ -61,7 +61,7 @@ def test_a_slip_length_is_found_where_it_is_the_truth(length: float):
 
 
 @pytest.mark.parametrize("friction", [0.1, 0.2])
-def test_an_effective_coefficient_is_found_where_it_is_the_truth(friction: float):
+def test_an_effective_coefficient_is_found_where_it_is_the_truth(friction):
     found = weighed("rigid", friction)
     assert not found.yielding_preferred
     one, each, slip = found.laws
@@ -134,7 +134,7 @@ def test_the_stiffness_is_friction_times_mean_pressure_over_the_slip_length():
     ],
 )
 def test_how_well_a_slip_length_can_be_known_is_what_the_documentation_says(
-    length: float, precision: Precision, expected: float
+    length, precision, expected
 ):
     assert relative_uncertainty(length, precision) == pytest.approx(expected, rel=0.15)
 

@@ -134,7 +134,7 @@ def test_a_decade_more_that_the_data_exclude_costs_its_share_of_the_evidence():
     [bounded_prior(0.3), log_uniform_prior(0.01, 10)],
     ids=["bounded", "log-uniform"],
 )
-def test_a_prior_is_shared_out_among_cells_and_adds_up_to_one(prior: Prior):
+def test_a_prior_is_shared_out_among_cells_and_adds_up_to_one(prior):
     weights = np.diff(prior(np.concatenate([[0.0], np.geomspace(1e-3, 50, 40), [np.inf]])))
     assert np.all(weights >= 0)
     assert weights.sum() == pytest.approx(1.0)
@@ -151,7 +151,7 @@ def test_a_prior_is_shared_out_among_cells_and_adds_up_to_one(prior: Prior):
         (151.0, "very strong"),
     ],
 )
-def test_words_for_a_bayes_factor_are_those_of_kass_and_raftery(factor: float, words: str):
+def test_words_for_a_bayes_factor_are_those_of_kass_and_raftery(factor, words):
     # Their table: 1 to 3, 3 to 20, 20 to 150, above 150.
     assert BayesFactor("one", "other", float(np.log(factor))).words == words
 

@@ -79,7 +79,7 @@ BY_NIGHT = {"white-noise-draw": pytest.mark.full_study}
 
 
 @pytest.mark.parametrize("case", [pytest.param(c, marks=BY_NIGHT.get(c, ())) for c in CASES])
-def test_a_draw_is_what_calibrate_says_of_the_drawn_scan(case: str):
+def test_a_draw_is_what_calibrate_says_of_the_drawn_scan(case):
     scans, options = CASES[case]
     calibration = memscal.calibrate(list(scans), **options)
     found = memscal.monte_carlo(calibration, draws=2, seed=5)
@@ -102,7 +102,7 @@ TRUTHS = {
 
 
 @pytest.mark.parametrize("source", TRUTHS)
-def test_voltages_of_a_draw_are_those_of_the_true_inputs(source: str):
+def test_voltages_of_a_draw_are_those_of_the_true_inputs(source):
     uncertainties = {"thickness_uncertainty": 1e-5, "poisson_ratio_uncertainty": 0.005}
     film = replace(EXACT_FILM, poisson_ratio=0.45, **uncertainties)
     quiet = {"noise": 1e-6, "baseline": 0.0, "drift": 0.0}

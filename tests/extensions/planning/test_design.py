@@ -42,7 +42,7 @@ def test_twice_the_load_or_four_repeats_halve_what_a_voltage_of_noise_makes_of_s
     assert once / 2 < heavy < 1.03 * once / 2
 
 
-def test_a_voltage_and_a_share_of_noise_are_the_same_thing(paper: Design):
+def test_a_voltage_and_a_share_of_noise_are_the_same_thing(paper):
     again = memscal.design(noise_voltage=paper.plan.point_noise)
     np.testing.assert_allclose(again.parameters.covariance, paper.parameters.covariance)
 
@@ -94,7 +94,7 @@ def test_a_disc_is_expected_as_a_disc():
     assert ours < 0.5 * theirs
 
 
-def test_another_method_is_expected_to_hide_more_behind_its_window(paper: Design):
+def test_another_method_is_expected_to_hide_more_behind_its_window(paper):
     other = memscal.design(method="white-noise")
     assert other.method == "white-noise"
     assert other.budget["fwhm"]["window"] > 0
@@ -103,7 +103,7 @@ def test_another_method_is_expected_to_hide_more_behind_its_window(paper: Design
         paper.relative_uncertainty("colour")
 
 
-def test_plans_are_varied_one_number_at_a_time(paper: Design):
+def test_plans_are_varied_one_number_at_a_time(paper):
     steps = [0.2e-3, 0.5e-3, 4e-3]
     designs = varied_designs(paper, "step", steps)
     # Of the last, five positions, nothing can be determined.
@@ -159,7 +159,7 @@ def test_a_target_out_of_reach_names_the_best_and_what_stands_in_the_way(want, v
     ({"half_range": 8.0}, "positions"),
     ({"kernel": memscal.GaussianMixture(sigmas=(0.561e-6,))}, "a point to a film of 2 mm"),
 ])  # fmt: skip
-def test_a_plan_that_makes_no_scan_is_refused(given: dict[str, Any], told: str):
+def test_a_plan_that_makes_no_scan_is_refused(given, told):
     with pytest.raises(InputError, match=told):
         Plan(**given)
 

@@ -5,7 +5,6 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from helpers.console import Run
 
 from memscal import import_table
 
@@ -47,7 +46,7 @@ def path(folder: Path) -> Path:
     return folder / "run.nxs"
 
 
-def test_datasets_and_what_nxdata_plots_are_read_in_their_units(path: Path):
+def test_datasets_and_what_nxdata_plots_are_read_in_their_units(path):
     for named in ({}, {"x": "/data/x", "u": "data/u"}):
         found = import_table(path, **named, time="/data/t")
         np.testing.assert_allclose([found.x, found.u_zz], [1e-3 * X, 1e-3 * X**2])
@@ -56,7 +55,7 @@ def test_datasets_and_what_nxdata_plots_are_read_in_their_units(path: Path):
 
 @pytest.mark.parametrize("plotted", [True, False])
 @pytest.mark.parametrize(("name", "why"), REFUSED.items())
-def test_a_dataset_that_is_no_column_is_refused(run: Run, path: Path, plotted, name, why):
+def test_a_dataset_that_is_no_column_is_refused(run, path, plotted, name, why):
     with h5py.File(path, "r+") as file:
         file["data"].attrs["axes"] = name
     named = [] if plotted else ["--x", f"/data/{name}", "--u", "/data/u"]

@@ -1,7 +1,5 @@
 """Files of SPEC and Bluesky: one scan is chosen of several."""
 
-from pathlib import Path
-
 import pytest
 
 from memscal import TableLayout, import_table
@@ -12,7 +10,7 @@ from memscal.errors import FormatError
     ("begun", "scan", "place"),
     [((3, 5, 9), 5, 1), ((3, 5, 9), 3, 0), ((7, 8, 9), 3, 2), ((4,), None, 0), ((4, 4), None, -1)],
 )
-def test_one_scan_of_a_file_is_read_and_several_are_refused(begun, scan, place, tmp_path: Path):
+def test_one_scan_of_a_file_is_read_and_several_are_refused(begun, scan, place, tmp_path):
     """By the number after #S, else counted; names hold single blanks, and motors differ."""
     path = tmp_path / "run.spec"
     path.write_text("#F run\n")

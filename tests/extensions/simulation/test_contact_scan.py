@@ -24,7 +24,7 @@ def truth(scan: Scan) -> dict[str, Any]:
     return dict(scan.synthetic)
 
 
-def test_contacts_that_scatter_are_those_solved_at_their_own_loads(seed: int):
+def test_contacts_that_scatter_are_those_solved_at_their_own_loads(seed):
     options: dict[str, Any] = {"load": [0.34, 1.37], "friction": 0.15, "points": 9, **STILL}
     options |= {"spacing": 1e-3, "position_error": 0.0, "load_reading": 0.0}
     scan = simulate_contacts(record_loads=True, load_scatter=0.02, seed=seed, **options)

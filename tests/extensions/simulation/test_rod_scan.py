@@ -11,7 +11,7 @@ from helpers.scans import LINEAR_FILM, STILL, simulate
 from scipy.special import j1
 from scipy.stats import chi2
 
-from memscal import GaussianMixture, RadialKernel, SmoothedDisc
+from memscal import GaussianMixture, SmoothedDisc
 from memscal.errors import InputError
 from memscal.extensions.simulation.rod_scan import PAPER_FILM
 from memscal.model.arrays import FloatArray
@@ -22,7 +22,7 @@ KERNELS = {"gaussian": GaussianMixture(), "ring": RING, "disc": DISC}
 
 
 @pytest.mark.parametrize("kernel", KERNELS.values(), ids=KERNELS)
-def test_the_voltage_over_the_plane_is_the_constant_times_the_load(kernel: RadialKernel):
+def test_the_voltage_over_the_plane_is_the_constant_times_the_load(kernel):
     # The integral of a smooth field is the sum of a raster's pixels; this one, of an
     # incompressible film, is gone only at 20 thicknesses.
     options: dict[str, Any] = {"points": 121, "half_range": 40e-3, "centre": (0.2e-3, -0.3e-3)}
@@ -46,7 +46,7 @@ def test_a_line_is_the_middle_row_of_a_raster():
 
 
 @pytest.mark.parametrize("noise", [0.001, 0.05])
-def test_the_noise_has_the_standard_deviation_that_is_stated(noise: float, seed: int):
+def test_the_noise_has_the_standard_deviation_that_is_stated(noise, seed):
     options: dict[str, Any] = {"points": 65, "repeats": 60, "load": [0.5, 1.5], "film": LINEAR_FILM}
     noisy, clean = (simulate(noise=s, seed=seed, **options) for s in (noise, 0.0))
     residual = noisy.u_zz - clean.u_zz
@@ -63,7 +63,7 @@ def test_the_noise_has_the_standard_deviation_that_is_stated(noise: float, seed:
         assert abs(products.mean()) < 7 / np.sqrt(products.size)
 
 
-def test_a_seed_gives_the_same_scan_whatever_else_draws_numbers(seed: int):
+def test_a_seed_gives_the_same_scan_whatever_else_draws_numbers(seed):
     before = np.random.get_state()[1].copy()  # noqa: NPY002
     first = simulate(points=17, seed=seed).u_zz
     np.testing.assert_array_equal(before, np.random.get_state()[1])  # noqa: NPY002
@@ -113,7 +113,7 @@ def test_the_scan_states_its_law_if_it_has_one_and_it_is_wanted(film, law, frict
     ({"half_range": 8.0}, "8"), ({"load": []}, "load"), ({"load": [-1.0, 3.0]}, "load"),
     ({"seed": -1}, "seed"), ({"centre": (float("nan"), 0.0)}, "centre"),
 ])  # fmt: skip
-def test_what_cannot_be_simulated_is_refused(options: dict[str, Any], problem: str):
+def test_what_cannot_be_simulated_is_refused(options, problem):
     with pytest.raises(InputError, match=problem):
         simulate(**options)
 
@@ -162,6 +162,6 @@ def test_any_object_with_the_three_methods_is_a_kernel():
         (561e-6, r"a float, which has no transform\(\)"),
     ],
 )
-def test_what_is_no_apparatus_function_is_refused(kernel: Any, problem: str):
+def test_what_is_no_apparatus_function_is_refused(kernel, problem):
     with pytest.raises(InputError, match=problem):
         simulate(kernel=kernel, points=9)

@@ -38,7 +38,7 @@ def worst(found: np.ndarray, expected: np.ndarray, scale: np.ndarray) -> float:
         for width in (0.5, 1.7)
     ],
 )
-def test_surface_and_base_are_as_by_hankel_transforms(nu, width) -> None:
+def test_surface_and_base_are_as_by_hankel_transforms(nu, width):
     ours = elements(nu, width)
     hankel = HankelFilm(ours.film, ours.r)
     p, q = tractions(ours.r)
@@ -64,7 +64,7 @@ def test_surface_and_base_are_as_by_hankel_transforms(nu, width) -> None:
     assert worst(a.spectrum(k, 1), b.spectrum(k, 1), load) < 1e-4
 
 
-def test_the_field_at_the_rings_is_what_the_compliance_says() -> None:
+def test_the_field_at_the_rings_is_what_the_compliance_says():
     ours = elements(0.5, 1.7)
     p, q = tractions(ours.r)
     field = ours.field(p, q)
@@ -79,7 +79,7 @@ def test_the_field_at_the_rings_is_what_the_compliance_says() -> None:
     )
 
 
-def test_finer_triangles_agree_better_with_hankel_transforms() -> None:
+def test_finer_triangles_agree_better_with_hankel_transforms():
     models = [elements(0.5, 1.0, rings=40, refinement=n) for n in (1, 2)]
     traction = tractions(models[0].r)
     expected = HankelFilm(models[0].film, models[0].r).field(*traction)
@@ -93,7 +93,7 @@ def test_finer_triangles_agree_better_with_hankel_transforms() -> None:
     assert on_top[1] < on_top[0] / 1.5
 
 
-def test_a_compressible_film_under_a_wide_pressure_is_an_oedometer() -> None:
+def test_a_compressible_film_under_a_wide_pressure_is_an_oedometer():
     soft = film(0.25)
     wide = ElementFilm(soft, np.linspace(0, 20 * H, 31), radius=30 * H)
     modulus = soft.shear_modulus * 2 * 0.75 / 0.5
@@ -104,14 +104,14 @@ def test_a_compressible_film_under_a_wide_pressure_is_an_oedometer() -> None:
     np.testing.assert_allclose(field.base(r, 0), 1e4, rtol=1e-6)
 
 
-def test_a_film_that_ends_near_the_load_is_softer() -> None:
+def test_a_film_that_ends_near_the_load_is_softer():
     ours = elements(0.5, 0.5)
     cut = ElementFilm(ours.film, ours.r, radius=0.8 * H).compliance.normal
     p = tractions(ours.r)[0]
     assert (cut @ p)[0] > 1.005 * (ours.compliance.normal @ p)[0]
 
 
-def test_beyond_the_edge_there_is_neither_stress_nor_surface() -> None:
+def test_beyond_the_edge_there_is_neither_stress_nor_surface():
     ours = elements(0.5, 0.5)
     field = ours.field(*tractions(ours.r))
     assert field.base(np.array([26e-3]), 0)[0] == 0

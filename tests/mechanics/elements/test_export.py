@@ -20,7 +20,7 @@ def solved(nu: float) -> tuple[ElementField, FieldMesh, np.ndarray, np.ndarray]:
     return field, field.mesh(), r, pressure
 
 
-def test_quadratic_triangles_cover_the_film_anticlockwise() -> None:
+def test_quadratic_triangles_cover_the_film_anticlockwise():
     _, mesh, _, _ = solved(0.5)
     corners = mesh.points[mesh.triangles[:, :3]]
     (x1, y1), (x2, y2) = ((corners[:, i] - corners[:, 0]).T for i in (1, 2))
@@ -33,7 +33,7 @@ def test_quadratic_triangles_cover_the_film_anticlockwise() -> None:
 
 
 @pytest.mark.parametrize("nu", [0.0, 0.3, 0.5])
-def test_the_stress_balances_the_tractions_on_both_faces(nu) -> None:
+def test_the_stress_balances_the_tractions_on_both_faces(nu):
     field, mesh, rings, pressure = solved(nu)
     r, z = mesh.points.T
     top = np.isclose(z, H, atol=1e-12)
@@ -47,7 +47,7 @@ def test_the_stress_balances_the_tractions_on_both_faces(nu) -> None:
     np.testing.assert_allclose(mesh.stress[base, 3], -field.base(r[base], 1), atol=2e-3 * peak)
 
 
-def test_the_displacement_is_that_of_the_field_with_z_upward() -> None:
+def test_the_displacement_is_that_of_the_field_with_z_upward():
     field, mesh, _, _ = solved(0.5)
     r, z = mesh.points.T
     top = np.isclose(z, H, atol=1e-12)
@@ -56,7 +56,7 @@ def test_the_displacement_is_that_of_the_field_with_z_upward() -> None:
     assert np.all(mesh.displacement[z == 0] == 0)
 
 
-def test_hooke_holds_on_the_axis_where_radial_and_hoop_stress_are_one() -> None:
+def test_hooke_holds_on_the_axis_where_radial_and_hoop_stress_are_one():
     _, mesh, _, _ = solved(0.3)
     axis = mesh.points[:, 0] == 0
     np.testing.assert_allclose(

@@ -13,7 +13,7 @@ RINGS = {"even": EVEN, "edge": TOWARD_AN_EDGE, "rod": LIKE_A_ROD, "uneven": UNEV
 
 
 @pytest.mark.parametrize("name", RINGS)
-def test_corners_on_the_surface_are_rings_and_the_last_ring_is_one(name) -> None:
+def test_corners_on_the_surface_are_rings_and_the_last_ring_is_one(name):
     mesh = film_triangles(RINGS[name], radius=12.5)
     rings = RINGS[name]
     surface = np.sort(mesh.points[mesh.points[:, 1] == 0, 0])
