@@ -522,7 +522,7 @@ def agreeing_tops(u: FloatArray) -> tuple[IndexArray, IndexArray, FloatArray]:
 
 def clipped_looks(u: FloatArray) -> FloatArray:
     """Return the highest readings that look as if held at a ceiling, none where none do."""
-    if u.size < 2 * FEWEST_AT_CEILING:
+    if u.size < 2 * FEWEST_AT_CEILING or not np.ptp(u):
         return u[:0]
     falling, counts, _ = agreeing_tops(u)
     return u[falling[: counts.max(initial=0)]]

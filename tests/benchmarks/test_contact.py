@@ -38,13 +38,13 @@ def plain_contact(problem: ContactProblem, depth: float) -> FloatArray:
     matrix = problem.compliance.normal[np.ix_(pressing, pressing)]
     scale = matrix[0, 0]
     pressure, _ = nnls(matrix / scale, (depth - problem.heights[pressing]) / scale)
-    whole = np.zeros(problem.size)
+    whole = np.zeros(problem.heights.size)
     whole[pressing] = pressure
     return whole
 
 
 def test_a_contact_costs_a_few_dense_solutions_and_less_than_least_squares(smooth):
-    right = np.ones(smooth.size)
+    right = np.ones(smooth.heights.size)
     depth = contact(smooth).depth
     assert depth == pytest.approx(43.766e-6, rel=1e-4)
     # Where the surfaces only just meet, least squares and Signorini differ by a ring.
@@ -64,11 +64,11 @@ def test_a_contact_costs_a_few_dense_solutions_and_less_than_least_squares(smoot
 def test_friction_along_a_path_costs_a_few_solutions_per_ring():
     problem = contact_of_200_rings(0.3)
     rough = problem.compliance
-    right = np.ones(2 * problem.size)
+    right = np.ones(2 * problem.heights.size)
     whole = np.block(
         [[rough.normal, rough.normal_by_shear], [rough.radial_by_pressure, rough.radial]]
     )
-    whole[problem.size, :] = np.eye(2 * problem.size)[problem.size]  # no shear on the axis
+    whole[problem.heights.size, :] = np.eye(2 * problem.heights.size)[problem.heights.size]  # no shear on the axis
 
     def path() -> object:
         return follow(problem, [Load(load) for load in LOADS], "incremental", 1)
