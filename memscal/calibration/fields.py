@@ -51,7 +51,7 @@ def choose_grid(estimate: ProfileEstimate, band: Band) -> GridChoice:
     # A shear's transform vanishes at k = 0, too: only what lies beyond its largest counts.
     beyond = np.arange(reference.size) > np.argmax(reference)
     closed = np.flatnonzero(beyond & (reference < 0.1 * NOISE_RATIO * band.weakest_reference))
-    last = band.k[closed[0] if closed.size else -1]
+    last = estimate.model.k[closed[0] if closed.size else -1]
     width = max(estimate.gaussian.sigma, 0.5 * points.step)
     spacing = min(width / _POINTS_PER_WIDTH, np.pi / (2 * last))
     spacing = float(support / (_COUNTED * np.ceil(support / spacing / _COUNTED)))

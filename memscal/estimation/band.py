@@ -14,7 +14,7 @@ import numpy as np
 from memscal.axisymmetry.kernels import gaussian_transfer
 from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.smoothing import SmoothedProfile
-from memscal.model.arrays import TINY, FloatArray, array_record
+from memscal.model.arrays import TINY, FloatArray, value_record
 
 #: A spectral component is relevant while it stands this many times above its noise: with the
 #: paper's tenth of the weakest one, noise and loss at the edge of the band are then about equal...
@@ -30,13 +30,10 @@ _SEEN = 2.0
 _DIRECTIONS = 24
 
 
-@array_record
+@value_record
 class Band:
-    """Signal and noise of the voltage's transform, and the relevant and resolved wavenumbers."""
+    """The relevant and resolved wavenumbers, and what a division does at them."""
 
-    k: FloatArray  # (n,): wavenumbers, in rad/m
-    signal: FloatArray  # (n,): modulus of the voltage's transform and its noise, in V m^2 / N
-    noise: FloatArray
     # Both wavenumbers in rad/m, and at most the last one that the scan's step samples.
     relevant: float  # beyond it the signal is less than 15 times the noise
     resolved: float  # up to it the uncertainty is less than a third of the Gaussian
@@ -61,8 +58,7 @@ def find_band(estimate: ProfileEstimate, smoothed: SmoothedProfile | None) -> Ba
         noise = error * estimate.conversion_constant * reference
     elif points.as_raster:
         # Of all points of a raster the noise is equal at all wavenumbers.
-        share = points.cell / points.place_numbers("readings") * estimate.outlier_weight
-        noise = np.full(k.size, np.linalg.norm(share * estimate.noise / points.load))
+        noise = np.asarray(np.linalg.norm(_shares(estimate) * estimate.noise))
         clear = RELEVANT_OF_RASTER
     else:
         noise = smoothed.noise
@@ -75,38 +71,40 @@ def find_band(estimate: ProfileEstimate, smoothed: SmoothedProfile | None) -> Ba
     end = int(lost[0]) + 1 if lost.size else k.size
     resolved = min(_falls_below(k[:end], ratio[:end], RESOLVED), sampled)
     weakest = (float(np.interp(relevant, k, modulus)) for modulus in (signal, reference))
-    return Band(k, signal, noise, relevant, resolved, *weakest)
+    return Band(relevant, resolved, *weakest)
 
 
 def beyond_zeros(
     band: Band, estimate: ProfileEstimate, wavenumber: FloatArray, voltage: FloatArray
 ) -> Band:
     """Find the band of a raster of a reference with zeros, of whose voltage the transform is."""
-    k = band.k
+    points = estimate.points
+    k = estimate.model.k
     reference = estimate.model.reference.values
     largest = envelope(reference)
     turns = np.flatnonzero(reference[1:] * reference[:-1] < 0)
     opens_again = largest[turns + 1] > _OPEN * band.weakest_reference
-    if not (estimate.points.as_raster and opens_again.any()):
+    if not (points.as_raster and opens_again.any()):
         return band
-    pair = slice(turns[0], turns[0] + 2)
-    order = np.argsort(reference[pair])
-    zero = float(np.interp(0.0, reference[pair][order], k[pair][order]))
-    excess = max(_residual_at(estimate, zero) / float(band.noise[0]), 1.0)
-    noise = excess * band.noise
+    # Root mean square over directions of the residuals' transform where the reference vanishes.
+    shares = _shares(estimate)
+    noise = float(np.linalg.norm(shares * estimate.noise))
+    angle = np.pi * np.arange(_DIRECTIONS) / _DIRECTIONS
+    along = np.outer(points.x, np.cos(angle)) + np.outer(points.y, np.sin(angle))
+    sums = (shares * (points.u - estimate.predicted)) @ np.exp(-1j * k[turns[0]] * along)
+    excess = max(float(np.linalg.norm(sums)) / _DIRECTIONS**0.5 / noise, 1.0)
+    noise *= excess
     # The mean of two lobes over all directions is smaller than either: their power is not.
     width = wavenumber[0, 1]
     ring = np.rint(wavenumber / width).astype(np.intp).ravel()
     power = np.bincount(ring, np.abs(voltage.ravel()) ** 2) / np.bincount(ring)
-    signal = np.interp(k, width * np.arange(power.size), np.sqrt(power))
-    relevant = min(_falls_below(k, signal / noise, _SEEN), np.pi / estimate.points.step)
-    last = float(np.interp(relevant, k, noise))
-    weakest = last / estimate.conversion_constant
+    rings = width * np.arange(power.size)
+    relevant = min(_falls_below(rings, np.sqrt(power) / noise, _SEEN), np.pi / points.step)
+    weakest = noise / estimate.conversion_constant
     share = min(_SEEN * weakest / float(np.interp(relevant, k, largest)), 1.0)
     blur = float(np.sqrt(-2 * np.log(share))) / relevant
     weakest *= RELEVANT_OF_RASTER
-    last *= RELEVANT_OF_RASTER
-    return Band(k, signal, noise, relevant, band.resolved, last, weakest, blur, excess)
+    return Band(relevant, band.resolved, RELEVANT_OF_RASTER * noise, weakest, blur, excess)
 
 
 def envelope(reference: FloatArray) -> FloatArray:
@@ -114,14 +112,10 @@ def envelope(reference: FloatArray) -> FloatArray:
     return np.maximum.accumulate(np.abs(reference)[::-1])[::-1]
 
 
-def _residual_at(estimate: ProfileEstimate, k: float) -> float:
-    """Root mean square over directions of the residuals' transform at a wavenumber, V m^2/N."""
+def _shares(estimate: ProfileEstimate) -> FloatArray:
+    """Area of the plane, over the load, for which each reading (n,) of a raster stands."""
     points = estimate.points
-    share = points.cell / points.place_numbers("readings") * estimate.outlier_weight / points.load
-    angle = np.pi * np.arange(_DIRECTIONS) / _DIRECTIONS
-    along = np.outer(points.x, np.cos(angle)) + np.outer(points.y, np.sin(angle))
-    sums = (share * (points.u - estimate.predicted)) @ np.exp(-1j * k * along)
-    return float(np.sqrt(np.mean(np.abs(sums) ** 2)))
+    return points.cell / points.place_numbers("readings") * estimate.outlier_weight / points.load
 
 
 def transfer_uncertainty(estimate: ProfileEstimate) -> FloatArray:

@@ -68,7 +68,9 @@ def test_friction_along_a_path_costs_a_few_solutions_per_ring():
     whole = np.block(
         [[rough.normal, rough.normal_by_shear], [rough.radial_by_pressure, rough.radial]]
     )
-    whole[problem.heights.size, :] = np.eye(2 * problem.heights.size)[problem.heights.size]  # no shear on the axis
+    whole[problem.heights.size, :] = np.eye(2 * problem.heights.size)[
+        problem.heights.size
+    ]  # no shear on the axis
 
     def path() -> object:
         return follow(problem, [Load(load) for load in LOADS], "incremental", 1)
