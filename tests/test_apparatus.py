@@ -25,6 +25,10 @@ from memscal.model.arrays import FloatArray
 SUPPORT = 6e-3
 DRAWS = 40 if FULL else 12
 RADII = np.linspace(0.0, 12e-3, 601)
+STRESS = unit_gaussian(RADII, 1e-3)
+AXIS = np.linspace(-8e-3, 8e-3, 81)
+X = np.linspace(-8e-3, 8e-3, 101)
+Y = np.linspace(-9e-3, 9e-3, 91)
 
 
 def with_kernel(kernel: Callable[[FloatArray], FloatArray]) -> ApparatusFunction:
@@ -46,8 +50,7 @@ def apparatus() -> ApparatusFunction:
 
 @settings(max_examples=25)
 @given(width=st.floats(0.2e-3, 1.5e-3), load=st.floats(0.01, 100.0))
-def test_a_gaussian_convolved_with_a_gaussian_is_a_wider_gaussian(width, load):
-    apparatus = with_kernel(lambda r: unit_gaussian(r, SIGMA))
+def test_a_gaussian_convolved_with_a_gaussian_is_a_wider_gaussian(apparatus, width, load):
     blurred = apparatus.convolve(RADII, load * unit_gaussian(RADII, width))
     exact = load * unit_gaussian(RADII, float(np.hypot(width, SIGMA)))
     np.testing.assert_allclose(blurred, exact, atol=1e-6 * exact[0])
@@ -73,22 +76,21 @@ def alike(apparatus) -> ApparatusFunction:
 @pytest.mark.parametrize("shape", IDEAL)
 def test_an_ideal_reference_is_predicted_by_its_closed_form(shape, alike):
     size, share = IDEAL[shape]
-    sensor = alike
     source = memscal.IdealReference(shape, size)
     x = np.linspace(-3e-3, 2e-3, 41)
-    expected = sensor.conversion_constant * share(np.abs(x))
-    volts = sensor.predict(x, source)
+    expected = alike.conversion_constant * share(np.abs(x))
+    volts = alike.predict(x, source)
     np.testing.assert_allclose(volts, expected, atol=1e-4 * expected.max())
-    errors = sensor.predict_uncertainty(x, source)
-    u_a = sensor.parameters.uncertainty("conversion_constant") / sensor.conversion_constant
+    errors = alike.predict_uncertainty(x, source)
+    u_a = alike.parameters.uncertainty("conversion_constant") / alike.conversion_constant
     np.testing.assert_allclose(errors, volts * np.hypot(0.02, u_a), atol=1e-5 * volts.max())
     if shape == "slit":
         with pytest.raises(InputError, match="same along itself"):
-            sensor.predict(x, source, y=x)
+            alike.predict(x, source, y=x)
         return
-    plane = sensor.predict(x, source, y=[0.0, 1e-3])
+    plane = alike.predict(x, source, y=[0.0, 1e-3])
     np.testing.assert_allclose(plane[0], expected, atol=2e-3 * expected.max())
-    over_plane = sensor.predict_uncertainty(x, source, y=[0.0])[0]
+    over_plane = alike.predict_uncertainty(x, source, y=[0.0])[0]
     np.testing.assert_allclose(over_plane, errors, atol=0.01 * errors.max())
 
 
@@ -146,24 +148,22 @@ def test_a_field_is_convolved_with_g_over_the_plane():
     axis = np.linspace(-4e-3, 4e-3, 161)
     field = ApparatusField(axis, axis, elliptic(axis, axis, sensor), np.zeros((161, 161)))
     apparatus = as_function(make_artifact(plane=field))
-    x = np.linspace(-8e-3, 8e-3, 101)
-    y = np.linspace(-9e-3, 9e-3, 91)
-    stress = 3.0 * elliptic(x, y, force * 1e-6)
-    exact = 3.0 * elliptic(x, y, sensor + force * 1e-6)
-    blurred = apparatus.convolve(x, stress, y=y)
+    stress = 3.0 * elliptic(X, Y, force * 1e-6)
+    exact = 3.0 * elliptic(X, Y, sensor + force * 1e-6)
+    blurred = apparatus.convolve(X, stress, y=Y)
     np.testing.assert_allclose(blurred, exact, atol=1e-5 * exact.max())
-    volts = apparatus.predict(x, stress, y=y)
+    volts = apparatus.predict(X, stress, y=Y)
     np.testing.assert_allclose(volts, apparatus.conversion_constant * blurred)
 
 
 @pytest.mark.parametrize(
     ("x", "y", "shape", "problem"),
     [
-        (np.linspace(-8e-3, 8e-3, 81), np.linspace(-8e-3, 8e-3, 80), (81, 81), "80 positions"),
-        (np.linspace(-8, 8, 81), np.linspace(-8e-3, 8e-3, 81), (81, 81), "200 mm"),
-        (np.geomspace(1e-3, 8e-3, 81), np.linspace(-8e-3, 8e-3, 81), (81, 81), "not even"),
-        (np.linspace(-8e-3, 8e-3, 81), np.linspace(-8e-3, 8e-3, 81), (81, 81), "the edge"),
-        (np.linspace(-8e-3, 8e-3, 81), np.linspace(-8e-3, 8e-3, 81), (81,), "no field"),
+        (AXIS, AXIS[1:], (81, 81), "80 positions"),
+        (1e3 * AXIS, AXIS, (81, 81), "200 mm"),
+        (np.geomspace(1e-3, 8e-3, 81), AXIS, (81, 81), "not even"),
+        (AXIS, AXIS, (81, 81), "the edge"),
+        (AXIS, AXIS, (81,), "no field"),
     ],
 )
 def test_a_field_that_cannot_be_convolved_is_refused(apparatus, x, y, shape, problem):
@@ -173,22 +173,18 @@ def test_a_field_that_cannot_be_convolved_is_refused(apparatus, x, y, shape, pro
 
 @settings(max_examples=8)
 @given(a=st.floats(-1e3, 1e3, width=16), b=st.floats(-1e3, 1e3, width=16))
-def test_the_convolution_is_linear(a, b):
-    apparatus = with_kernel(lambda r: unit_gaussian(r, SIGMA))
-    one = unit_gaussian(RADII, 1e-3)
+def test_the_convolution_is_linear(apparatus, a, b):
     two = unit_gaussian(RADII, 0.6e-3) * (RADII / 1e-3) ** 2
-    together = apparatus.convolve(RADII, a * one + b * two)
-    apart = a * apparatus.convolve(RADII, one) + b * apparatus.convolve(RADII, two)
-    np.testing.assert_allclose(together, apart, atol=1e-9 * (abs(a) + abs(b)) * one[0])
+    together = apparatus.convolve(RADII, a * STRESS + b * two)
+    apart = a * apparatus.convolve(RADII, STRESS) + b * apparatus.convolve(RADII, two)
+    np.testing.assert_allclose(together, apart, atol=1e-9 * (abs(a) + abs(b)) * STRESS[0])
 
 
 @pytest.mark.parametrize(
     "uneven",
     [
-        np.concatenate([np.linspace(0.0, 4e-3, 300), np.geomspace(4e-3, 12e-3, 60)[1:]]),
-        np.concatenate(
-            [np.linspace(0.0, 6e-3, 301), [8e-3, 10e-3, 12e-3]]
-        ),  # where there is no stress
+        np.append(np.linspace(0.0, 4e-3, 300), np.geomspace(4e-3, 12e-3, 60)[1:]),
+        np.append(RADII[:301], [8e-3, 10e-3, 12e-3]),  # where there is no stress
     ],
 )
 def test_uneven_radii_give_the_same_as_even_ones(apparatus, uneven):
@@ -215,13 +211,13 @@ def test_the_radial_profile_is_that_of_the_table_between_its_radii(apparatus):
 @pytest.mark.parametrize(
     ("r", "sigma", "problem"),
     [
-        (RADII * 1e3, unit_gaussian(RADII, 1e-3), "r reaches 12 m"),
-        (RADII[::40], unit_gaussian(RADII[::40], 1e-3), "every 0.8 mm, coarser"),
-        (RADII[:101], unit_gaussian(RADII[:101], 1e-3), "13.5% of the largest stress is left"),
-        (RADII[:-1], unit_gaussian(RADII, 1e-3), "601 stresses for 600 radii"),
-        (RADII[::-1], unit_gaussian(RADII, 1e-3), "r must increase"),
-        (RADII - 1e-4, unit_gaussian(RADII, 1e-3), "r begins at -0.0001 m"),
-        (RADII[100:], unit_gaussian(RADII[100:], 1e-3), "r begins at 0.002 m"),
+        (RADII * 1e3, STRESS, "r reaches 12 m"),
+        (RADII[::40], STRESS[::40], "every 0.8 mm, coarser"),
+        (RADII[:101], STRESS[:101], "13.5% of the largest stress is left"),
+        (RADII[:-1], STRESS, "601 stresses for 600 radii"),
+        (RADII[::-1], STRESS, "r must increase"),
+        (RADII - 1e-4, STRESS, "r begins at -0.0001 m"),
+        (RADII[100:], STRESS[100:], "r begins at 0.002 m"),
         (np.outer([1, 1], RADII), np.outer([1, 1], RADII), "r has shape"),
         ([], [], "r has shape"),
         (RADII, np.full(601, np.nan), "sigma_zz holds a value that is not finite"),
@@ -250,15 +246,12 @@ def test_a_compact_artifact_is_half_as_large_and_convolves_the_same(tmp_path):
     assert read.content_digest != whole.content_digest
     np.testing.assert_allclose(read.field.g, whole.field.g, atol=1e-5 * whole.field.g.max())
     np.testing.assert_allclose(read.field.g_errors, whole.field.g_errors, rtol=1e-6)
-    x = np.linspace(-8e-3, 8e-3, 101)
-    y = np.linspace(-9e-3, 9e-3, 91)
-    stress = elliptic(x, y, np.array([[1.0, -0.6], [-0.6, 2.0]]) * 1e-6)
-    expected = whole.convolve(x, stress, y=y)
-    np.testing.assert_allclose(read.convolve(x, stress, y=y), expected, atol=1e-5 * expected.max())
+    stress = elliptic(X, Y, np.array([[1.0, -0.6], [-0.6, 2.0]]) * 1e-6)
+    expected = whole.convolve(X, stress, y=Y)
+    np.testing.assert_allclose(read.convolve(X, stress, y=Y), expected, atol=1e-5 * expected.max())
 
 
-def test_g_that_is_not_round_stays_in_a_compact_artifact():
-    apparatus = with_kernel(lambda r: unit_gaussian(r, SIGMA))
+def test_g_that_is_not_round_stays_in_a_compact_artifact(apparatus):
     axis = np.linspace(-SUPPORT, SUPPORT, 801)
     oval = elliptic(axis, axis, np.diag([1.01, 1 / 1.01]) * SIGMA**2)
     field = ApparatusField(axis, axis, oval, np.zeros_like(oval))

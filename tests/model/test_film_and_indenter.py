@@ -90,15 +90,18 @@ def test_a_profile_goes_through_its_table_and_nowhere_else():
     assert profile != Profile(r=profile.r, z=2 * profile.z)
 
 
+RADII = np.arange(4.0)
+
+
 @pytest.mark.parametrize(("r", "z", "message"), [
-    ([0.0, 1.0, 2.0, 3.0], [1.0, 2.0, 3.0, 4.0], "touches first"),
-    ([0.0, 1.0, 2.0, 3.0], [0.0, -1.0, 3.0, 4.0], "lowest height"),
-    ([0.0, 1.0, 2.0, 3.0], [0.0, 0.0, 0.0, 0.0], "press a Rod"),
-    ([0.0, 1.0, 2.0, 3.0], [0.0, math.nan, 3.0, 4.0], "height .* not finite"),
-    ([0.0, 2.0, 1.0, 3.0], [0.0, 1.0, 2.0, 3.0], "increase"),
-    ([0.5, 1.0, 2.0, 3.0], [0.0, 1.0, 2.0, 3.0], "first at the axis"),
-    ([0.0, 1.0, 2.0], [0.0, 1.0, 2.0], "four or more"),
-    ([0.0, 1.0, 2.0, 3.0], [0.0, 1.0, 2.0], "3 heights"),
+    (RADII, RADII + 1, "touches first"),
+    (RADII, [0.0, -1.0, 3.0, 4.0], "lowest height"),
+    (RADII, 0 * RADII, "press a Rod"),
+    (RADII, [0.0, math.nan, 3.0, 4.0], "height .* not finite"),
+    ([0.0, 2.0, 1.0, 3.0], RADII, "increase"),
+    ([0.5, 1.0, 2.0, 3.0], RADII, "first at the axis"),
+    (RADII[:3], RADII[:3], "four or more"),
+    (RADII, RADII[:3], "3 heights"),
 ])  # fmt: skip
 def test_a_profile_that_cannot_touch_is_refused(r, z, message):
     with pytest.raises(InputError, match=f"(?i){message}"):
@@ -108,7 +111,7 @@ def test_a_profile_that_cannot_touch_is_refused(r, z, message):
 @pytest.mark.parametrize(
     ("modulus", "thickness", "meant"),
     [
-        (1.8, 1.5, "1.8 MPa was(.|\n)*1.5 mm was"),
+        (1.8, 1.5, "modulus is 1.8 Pa. Probably 1.8 MPa was(.|\n)*1.5 mm was"),
         (0.9, 0.2, "0.9 MPa(.|\n)*0.2 mm was"),
         (1.8, 1.5e-3, "1.8 MPa was"),
         (2.2e6, 2e-3, ""),

@@ -17,7 +17,7 @@ from memscal.formats.tables.reference import ImportedProfile
 from memscal.mechanics.film_response import base_stress
 from memscal.model.film import ElasticFilm
 
-pytestmark = pytest.mark.usefixtures("at_once")
+pytestmark = pytest.mark.usefixtures("at_once", "folder")
 
 DATA = Path(__file__).parents[2] / "data"
 
@@ -40,13 +40,13 @@ def imported(path: Path, sigma: str = "S6", **options: Any) -> ImportedProfile:
     return read_reference_mesh(path, sigma=sigma, **given)
 
 
-def saved(mesh: meshio.Mesh, path: Path, **options: Any) -> Path:
+def saved(mesh: meshio.Mesh, name: str = "film.vtu", **options: Any) -> Path:
     """Save a mesh with meshio, whose XDMF knows no fields of four components."""
-    if path.suffix == ".xdmf":
+    if name.endswith(".xdmf"):
         for fields in (mesh.point_data, mesh.cell_data):
-            for name in ("S4", "C4"):
-                fields.pop(name, None)
-    return write(mesh, path, **options)
+            for field in ("S4", "C4"):
+                fields.pop(field, None)
+    return write(mesh, Path(name), **options)
 
 
 def assert_is_the_section(found: ImportedProfile, *, turned: int = 1) -> None:
@@ -86,14 +86,13 @@ def test_a_mesh_as_paraview_writes_it_is_read_at_its_nodes_and_in_its_cells():
     ("film.vtu", {"header_type": "UInt64"}), ("film.vtk", {}), ("film.vtk", {"fmt_version": "4.2"}),
     ("film.xdmf", {}), ("film.xdmf", {"data_format": "XML"}),
 ])  # fmt: skip
-def test_every_kind_of_file_gives_the_same_stress(tmp_path, name, options):
-    assert_is_the_section(imported(saved(section(), tmp_path / name, **options), "S9"))
+def test_every_kind_of_file_gives_the_same_stress(name, options):
+    assert_is_the_section(imported(saved(section(), name, **options), "S9"))
 
 
 @pytest.mark.parametrize("compression", [None, "zlib"])
-def test_appended_raw_bytes_are_read_as_paraview_writes_them(tmp_path, compression):
-    path = tmp_path / "film.vtu"
-    saved(section(), path, compression=compression, header_type="UInt64")
+def test_appended_raw_bytes_are_read_as_paraview_writes_them(compression):
+    path = saved(section(), compression=compression, header_type="UInt64")
     raw = b""
 
     def append(array: re.Match[str]) -> str:
@@ -113,8 +112,8 @@ def test_appended_raw_bytes_are_read_as_paraview_writes_them(tmp_path, compressi
 @pytest.mark.parametrize(
     ("sigma", "plane"), [("S4", "xy"), ("S4", "yz"), ("S6", "xz"), ("S6", "yz"), ("S9", "xz")]
 )
-def test_the_components_of_a_tensor_are_found_in_every_plane(tmp_path, sigma, plane):
-    assert_is_the_section(imported(saved(section(plane), tmp_path / "film.vtu"), sigma))
+def test_the_components_of_a_tensor_are_found_in_every_plane(sigma, plane):
+    assert_is_the_section(imported(saved(section(plane)), sigma))
 
 
 @pytest.mark.parametrize(("plane", "order", "shear"), [
@@ -123,22 +122,20 @@ def test_the_components_of_a_tensor_are_found_in_every_plane(tmp_path, sigma, pl
     ("yz", [0, 1, 2, 4, 5, 3], "S6:4"),
 ])  # fmt: skip
 @pytest.mark.parametrize("kept", ["point_data", "cell_data"])
-def test_shears_of_a_section_in_another_order_are_refused_unless_named(
-    tmp_path, plane, order, shear, kept
-):
+def test_shears_of_a_section_in_another_order_are_refused_unless_named(plane, order, shear, kept):
     mesh = section(plane)
     six = mesh.point_data["S6"][:, order]
     mesh.point_data = {"S6": six} if kept == "point_data" else {}
     mesh.cell_data = {"S6": [six[mesh.cells[0].data].mean(axis=1)]} if kept == "cell_data" else {}
-    path = saved(mesh, tmp_path / "film.vtu")
+    path = saved(mesh)
     with pytest.raises(InputError, match=f"'{shear}' is not zero(.|\n)*--shear \"{shear}"):
         imported(path, "S6")
     found = imported(path, "S6", shear=shear).profile
     assert np.abs(found.sigma_rz).max() > 0.05 * found.sigma_zz.max()
 
 
-def test_the_axis_across_the_film_can_be_named(tmp_path):
-    path = saved(section("yx"), tmp_path / "film.vtu")  # y is the radius, x the height
+def test_the_axis_across_the_film_can_be_named():
+    path = saved(section("yx"))  # y is the radius, x the height
     (warning,) = [note for note in imported(path).notes if note.kind == "vertical_axis"]
     assert "8 mm along y but 2 mm along x" in warning.text
     assert_is_the_section(imported(path, vertical="x"))
@@ -146,10 +143,10 @@ def test_the_axis_across_the_film_can_be_named(tmp_path):
         imported(path, vertical="z")
 
 
-def test_one_value_or_one_component_is_taken_as_it_is_named(tmp_path):
+def test_one_value_or_one_component_is_taken_as_it_is_named():
     mesh = section()
     mesh.point_data["S:2"] = mesh.point_data["S33"]
-    path = saved(mesh, tmp_path / "film.vtu")
+    path = saved(mesh)
     assert_is_the_section(imported(path, "S:2", shear="S13"))
     assert imported(path, "S33").profile.sigma_rz is None
     assert_is_the_section(imported(path, "S33", shear="S13"))
@@ -159,13 +156,13 @@ def test_one_value_or_one_component_is_taken_as_it_is_named(tmp_path):
         imported(path, "S6:7")
 
 
-def test_a_film_hanging_from_its_base_has_its_shear_turned(tmp_path):
+def test_a_film_hanging_from_its_base_has_its_shear_turned():
     mesh = section(heights=HEIGHTS - 2.0)
     # The stress of the base, now at y = 0, is that of the highest nodes.
-    assert_is_the_section(imported(saved(mesh, tmp_path / "film.vtu"), base=0.0), turned=-1)
+    assert_is_the_section(imported(saved(mesh), base=0.0), turned=-1)
 
 
-def test_what_lies_below_the_base_of_the_film_is_left_out(tmp_path):
+def test_what_lies_below_the_base_of_the_film_is_left_out():
     """Film and substrate share no nodes where the radial stress jumps, as programs save it."""
     film = section()
     substrate = section(heights=np.linspace(-1.0, 0.0, 3))
@@ -176,13 +173,13 @@ def test_what_lies_below_the_base_of_the_film_is_left_out(tmp_path):
         point_data={"S6": np.concatenate([film.point_data["S6"], np.full((count - 41, 6), 9.0)])},
         cell_data={"C33": [*film.cell_data["C33"], np.full(80, 9.0)]},
     )
-    path = saved(mesh, tmp_path / "film.vtu")
+    path = saved(mesh)
     assert_is_the_section(imported(path, base=0.0))
     found = imported(path, "C33", base=0.0).profile
     np.testing.assert_allclose(found.sigma_zz, 1e6 * pressure(1e3 * found.r), rtol=1e-12)
 
 
-def test_a_rigid_bodys_own_node_and_the_faces_of_the_mesh_do_not_count(tmp_path):
+def test_a_rigid_bodys_own_node_and_the_faces_of_the_mesh_do_not_count():
     mesh = section()
     lone = np.concatenate([mesh.points, [[0.0, -5.0, 0.0]]])
     fields = {"S6": np.concatenate([mesh.point_data["S6"], np.full((1, 6), np.nan)])}
@@ -190,13 +187,12 @@ def test_a_rigid_bodys_own_node_and_the_faces_of_the_mesh_do_not_count(tmp_path)
     sides = np.stack([base[:-1], base[1:]], axis=1)
     cells = [("quad", mesh.cells[0].data), ("line", sides), ("vertex", [[len(mesh.points)]])]
     values = [mesh.cell_data["C33"][0], np.full(40, 7.0), np.full(1, 7.0)]
-    path = tmp_path / "film.vtu"
-    saved(meshio.Mesh(lone, cells, point_data=fields, cell_data={"C33": values}), path)
+    path = saved(meshio.Mesh(lone, cells, point_data=fields, cell_data={"C33": values}))
     assert_is_the_section(imported(path))
     assert imported(path, "C33").profile.force == pytest.approx(1.0, rel=1e-3)
 
 
-def test_values_given_for_each_element_are_averaged_at_shared_nodes(tmp_path):
+def test_values_given_for_each_element_are_averaged_at_shared_nodes():
     mesh = section()
     corners = mesh.cells[0].data
     stress = mesh.point_data["S33"][corners] * [0.9, 1.1, 1.0, 1.0]
@@ -205,7 +201,7 @@ def test_values_given_for_each_element_are_averaged_at_shared_nodes(tmp_path):
         [("quad", np.arange(corners.size).reshape(-1, 4))],
         point_data={"S33": stress.ravel()},
     )
-    found = imported(saved(apart, tmp_path / "film.vtu"), "S33")
+    found = imported(saved(apart), "S33")
     np.testing.assert_allclose(found.profile.r, 1e-3 * RADII, atol=1e-12)
     inner = found.profile.sigma_zz[1:-1]
     np.testing.assert_allclose(inner, 1e6 * pressure(RADII[1:-1]), rtol=1e-12)
@@ -221,20 +217,20 @@ def test_values_given_for_each_element_are_averaged_at_shared_nodes(tmp_path):
     ],
     ids=["quarter", "whole", "half, off the centre"],
 )
-def test_a_film_in_3d_is_averaged_over_circles(tmp_path, x, y, centre):
+def test_a_film_in_3d_is_averaged_over_circles(x, y, centre):
     """Linear interpolation on squares of 0.2 mm costs at most 0.2² / 4 of the curvature."""
     place = (1e-3 * centre[0], 1e-3 * centre[1]) if any(centre) else None
-    found = imported(saved(block(x, y, centre=centre), tmp_path / "film.vtu"), centre=place).profile
+    found = imported(saved(block(x, y, centre=centre)), centre=place).profile
     exact = 1e6 * pressure(1e3 * found.r)
     np.testing.assert_allclose(found.sigma_zz, exact, atol=0.011 * exact.max())
     assert found.force == pytest.approx(1.0, abs=0.01)
 
 
-def test_units_and_signs_are_those_that_are_given(tmp_path):
+def test_units_and_signs_are_those_that_are_given():
     mesh = section()
     mesh.points = mesh.points * 1e-3
     mesh.point_data = {"p": -1e3 * mesh.point_data["S33"]}
-    path = saved(mesh, tmp_path / "film.vtu")
+    path = saved(mesh)
     found = imported(path, "p", r_unit="m", sigma_unit="kPa", sign=1)
     np.testing.assert_allclose(found.profile.sigma_zz, 1e6 * pressure(RADII), rtol=1e-12)
     with pytest.raises(InputError, match=r"sign=1; --sign 1"):
@@ -245,19 +241,19 @@ def test_units_and_signs_are_those_that_are_given(tmp_path):
         imported(path, "p", r_unit="kPa", sigma_unit="kPa", sign=1)
 
 
-def test_a_mesh_without_fields_is_refused(tmp_path):
-    path = saved(meshio.Mesh(section().points, section().cells), tmp_path / "film.vtu")
+def test_a_mesh_without_fields_is_refused():
+    path = saved(meshio.Mesh(section().points, section().cells))
     with pytest.raises(InputError, match="no fields at all"):
         imported(path, "Stress")
 
 
-def test_a_field_that_may_mean_several_things_is_not_guessed_at(tmp_path):
+def test_a_field_that_may_mean_several_things_is_not_guessed_at():
     with pytest.raises(InputError, match=r'"S6:2"'):
-        imported(saved(section(), tmp_path / "film.xdmf"), "S6")
-    assert imported(tmp_path / "film.xdmf", "S6:2").profile.sigma_rz is None
+        imported(saved(section(), "film.xdmf"), "S6")
+    assert imported(Path("film.xdmf"), "S6:2").profile.sigma_rz is None
     mesh = section()
     mesh.point_data["plane"] = mesh.point_data["S9"][:, [0, 1, 3, 4]]  # xx, xy, yx, yy
-    path = saved(mesh, tmp_path / "film.vtu")
+    path = saved(mesh)
     for name in ("plane", "u"):
         with pytest.raises(InputError, match="components, and which of them is meant"):
             imported(path, name)
@@ -280,25 +276,25 @@ def test_a_field_that_may_mean_several_things_is_not_guessed_at(tmp_path):
         (meshio.Mesh(section().points[:, ::2], [("line", [[0, 1]])]), {}, "a line or a point"),
     ],
 )
-def test_a_mesh_without_a_base_that_can_be_used_is_refused(tmp_path, mesh, options, words):
-    path = saved(mesh, tmp_path / "film.vtk")
+def test_a_mesh_without_a_base_that_can_be_used_is_refused(mesh, options, words):
+    path = saved(mesh, "film.vtk")
     with pytest.raises(InputError, match=words) as caught:
         imported(path, **options)
     assert caught.value.cure
 
 
-def test_a_value_that_is_no_number_is_refused_only_where_it_matters(tmp_path):
+def test_a_value_that_is_no_number_is_refused_only_where_it_matters():
     mesh = section()
     inside = int(np.flatnonzero(mesh.points[:, 1] > 0)[5])
     mesh.point_data["S6"][inside] = np.nan
-    assert_is_the_section(imported(saved(mesh, tmp_path / "film.vtu")))
+    assert_is_the_section(imported(saved(mesh)))
     mesh.point_data["S6"][4 * 3] = np.inf
     with pytest.raises(InputError, match="sigma_zz is not a number in base node 4"):
-        imported(saved(mesh, tmp_path / "film.vtu"))
+        imported(saved(mesh))
     solid = block(RADII, RADII)
     solid.point_data["S33"][0] = np.nan
     with pytest.raises(InputError, match="sigma_zz is not a number in base node 1"):
-        imported(saved(solid, tmp_path / "film.vtu"), "S33")
+        imported(saved(solid), "S33")
 
 
 def test_a_mesh_of_another_kind_is_refused_with_those_that_are_read():
