@@ -28,12 +28,12 @@ _EXPLAINED = """\
 reconvolution: scan against G convolved with the reference, or the restored stress blurred
     the result misses something: if chi_square passes, use bayesian
 constraint: rise of chi-square by --option nonnegative=true or monotone=true
-    the scan contradicts the constraint: leave it out
+    the scan contradicts it: leave it out
 gaussian_misfit: scan against the best Gaussian convolved with the reference
     G or a statement is wrong: the check says
 method_agreement: division against Bayesian estimate, in A and G(r), over what noise explains
     compare both G(r) and the residuals
-width_agreement: width of G against that of the Gaussian, in standard uncertainties without misfit
+width_agreement: width of G against that of the Gaussian, in u without misfit
     one width does not describe G: use the profile
 shape_width: full width of G at half maximum over a Gaussian's, or the inverse
     G is a spike or has lobes far out: use white-noise or bayesian
@@ -68,13 +68,13 @@ noise_as_stated: scatter over the stated noise
 chi_square: residuals that no radial G, or no radial stress, explains, against the noise
     check reference (rod, film), baseline, stated noise, roundness of a contact
 residual_steps: largest step of the residuals, in standard deviations
-    a baseline that steps or bends, a wrong reference, slow noise
+    look for a step or bend of the baseline, a wrong reference, slow noise
 residual_correlation: correlation of neighbouring residuals
     as residual_steps; or state u_zz_correlation
 gaussian_evidence: logarithm of the Bayes factor for a departure of G from a Gaussian
     as gaussian_misfit
 symmetry: difference of left and right (lines); even part of a shear
-    a tilted rod, uneven film, drifting load or lag
+    look for a tilted rod, uneven film, drifting load or lag
 axisymmetry: ellipticity of the sensor or of the contact (rasters)
     it is not round; of a calibration G(r) is a mean over directions
 load_linearity: change of A with the load (several loads)
