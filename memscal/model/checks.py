@@ -60,7 +60,7 @@ reference_force: total force of the reference against its load
 indentation: what a neo-Hookean film would change of A or of the width, over its uncertainty
     give the film's law (--film-law) or none, or lighten the load
 outliers: share of points with less than half of their weight
-    find out what disturbs these points
+    find what disturbs these points
 saturation: number of points at a ceiling near the largest voltage (not of a shear)
     lower gain or load, or leave them out (--ceiling)
 noise_as_stated: scatter over the stated noise
