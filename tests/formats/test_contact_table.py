@@ -17,6 +17,8 @@ from memscal.formats.cache import (
 from memscal.formats.hdf5.writer import Group, file_tree, write_tree
 from memscal.model.arrays import FloatArray
 
+pytestmark = pytest.mark.usefixtures("folder")
+
 KEY = table_key({"load": 0.34})
 
 
@@ -38,85 +40,95 @@ def table(values: int = 3) -> dict[str, FloatArray]:
     }
 
 
-def entry(folder: Path, key: str = KEY) -> Path:
-    return folder / f"{key}.h5"
+def entry(key: str = KEY) -> Path:
+    return Path(f"{key}.h5")
 
 
-def test_a_table_comes_back_bit_for_bit_also_what_is_infinite_or_unknown(tmp_path):
+def keep(key: str = KEY) -> bool:
+    return keep_contact_table(Path(), key, table())
+
+
+def find(key: str = KEY) -> dict[str, FloatArray] | None:
+    return find_contact_table(Path(), key)
+
+
+def test_a_table_comes_back_bit_for_bit_also_what_is_infinite_or_unknown():
     one = table()
-    assert keep_contact_table(tmp_path / "made" / "anew", KEY, one)
-    found = find_contact_table(tmp_path / "made" / "anew", KEY)
+    anew = Path("made", "anew")
+    assert keep_contact_table(anew, KEY, one)
+    found = find_contact_table(anew, KEY)
     assert list(found) == list(one)
     for name, array in one.items():
         np.testing.assert_array_equal(found[name], array)
 
 
 @pytest.mark.parametrize("share", [0.0, 0.3, 0.99])
-def test_a_file_that_was_cut_off_is_not_found_and_is_replaced(tmp_path, share):
-    keep_contact_table(tmp_path, KEY, table())
-    data = entry(tmp_path).read_bytes()
-    entry(tmp_path).write_bytes(data[: int(share * len(data))])
-    assert find_contact_table(tmp_path, KEY) is None
-    assert keep_contact_table(tmp_path, KEY, table())
-    assert find_contact_table(tmp_path, KEY) is not None
+def test_a_file_that_was_cut_off_is_not_found_and_is_replaced(share):
+    keep()
+    data = entry().read_bytes()
+    entry().write_bytes(data[: int(share * len(data))])
+    assert find() is None
+    assert keep()
+    assert find() is not None
 
 
-def test_bytes_that_were_changed_never_give_other_numbers(tmp_path):
-    keep_contact_table(tmp_path, KEY, table())
-    data = entry(tmp_path).read_bytes()
+def test_bytes_that_were_changed_never_give_other_numbers():
+    keep()
+    data = entry().read_bytes()
     one = table()
     for place in np.linspace(0, len(data) - 1, 60).astype(int):
         changed = bytearray(data)
         changed[place] ^= 0xFF
-        entry(tmp_path).write_bytes(changed)
-        found = find_contact_table(tmp_path, KEY)
+        entry().write_bytes(changed)
+        found = find()
         assert found is None or np.array_equal(found["spectra"], one["spectra"])
 
 
-def test_a_table_under_the_name_of_another_is_not_taken_for_it(tmp_path):
+def test_a_table_under_the_name_of_another_is_not_taken_for_it():
     other = table_key({"load": 2.75})
-    keep_contact_table(tmp_path, other, table())
-    entry(tmp_path, other).rename(entry(tmp_path))
-    assert find_contact_table(tmp_path, KEY) is None
+    keep(other)
+    entry(other).rename(entry())
+    assert find() is None
 
 
-def test_a_file_of_another_kind_or_version_is_not_found(tmp_path):
-    write_tree(file_tree("another-kind", Group("NXentry", {"key": KEY})), entry(tmp_path))
-    assert find_contact_table(tmp_path, KEY) is None
-    keep_contact_table(tmp_path, KEY, table())
-    with h5py.File(entry(tmp_path), "r+") as file:
+def test_a_file_of_another_kind_or_version_is_not_found():
+    write_tree(file_tree("another-kind", Group("NXentry", {"key": KEY})), entry())
+    assert find() is None
+    keep()
+    with h5py.File(entry(), "r+") as file:
         file.attrs["memscal_schema_version"] = "0.9.0"
-    assert find_contact_table(tmp_path, KEY) is None
+    assert find() is None
 
 
-def test_a_folder_that_cannot_be_made_costs_no_result(tmp_path):
-    (tmp_path / "file").write_text("not a folder")
-    assert not keep_contact_table(tmp_path / "file", KEY, table())
-    assert not keep_contact_table(tmp_path / "file" / "below", KEY, table())
-    assert find_contact_table(tmp_path / "file", KEY) is None
-    assert (tmp_path / "file").read_text() == "not a folder"
+def test_a_folder_that_cannot_be_made_costs_no_result():
+    file = Path("file")
+    file.write_text("not a folder")
+    assert not keep_contact_table(file, KEY, table())
+    assert not keep_contact_table(file / "below", KEY, table())
+    assert find_contact_table(file, KEY) is None
+    assert file.read_text() == "not a folder"
 
 
-def test_the_tables_used_longest_ago_make_room(tmp_path, monkeypatch):
+def test_the_tables_used_longest_ago_make_room(monkeypatch):
     monkeypatch.setattr(contact_table, "_MOST_ENTRIES", 3)
     keys = [table_key({"number": number}) for number in range(4)]
     for age, key in enumerate(keys[:3]):
-        keep_contact_table(tmp_path, key, table())
-        os.utime(entry(tmp_path, key), (1e9 + age, 1e9 + age))
-    assert find_contact_table(tmp_path, keys[0]) is not None  # used again
-    keep_contact_table(tmp_path, keys[3], table())
-    assert {key for key in keys if entry(tmp_path, key).exists()} == {keys[0], keys[2], keys[3]}
+        keep(key)
+        os.utime(entry(key), (1e9 + age, 1e9 + age))
+    assert find(keys[0]) is not None  # used again
+    keep(keys[3])
+    assert {key for key in keys if entry(key).exists()} == {keys[0], keys[2], keys[3]}
 
 
-def test_several_may_write_and_read_one_entry_at_a_time(tmp_path):
+def test_several_may_write_and_read_one_entry_at_a_time():
     large = table(3)
     small = {name: array for name, array in large.items() if not name.startswith("change_")}
 
     def work(number: int) -> bool:
-        keep_contact_table(tmp_path, KEY, small if number % 2 else large)
-        found = find_contact_table(tmp_path, KEY)
+        keep_contact_table(Path(), KEY, small if number % 2 else large)
+        found = find()
         return found is not None and np.array_equal(found["spectra"], small["spectra"])
 
     with ThreadPoolExecutor(4) as pool:
         assert all(pool.map(work, range(24)))
-    assert [path.name for path in tmp_path.iterdir()] == [f"{KEY}.h5"]
+    assert [path.name for path in Path().iterdir()] == [f"{KEY}.h5"]

@@ -10,6 +10,9 @@ from helpers.tables import imported
 
 from memscal.errors import InputError, UnitWarning
 
+pytestmark = pytest.mark.usefixtures("folder")
+
+TABLE = Path("t.csv")
 N = 15
 X = np.arange(N) - 7.0
 U = np.round(0.02 + 1.5 * np.exp(-((X / 2) ** 2)), 4)
@@ -39,7 +42,7 @@ AFTER_INDEX = {**BY_NUMBER, "x": 2, "u": 3}
 NO_UNITS = {"x_unit": "mm", "u_unit": "mV"}
 
 
-def scan_of(folder: Path, tables: str, **options: Any) -> Any:
+def scan_of(tables: str, **options: Any) -> Any:
     """Import tables, parted by &: a head, ~, and the template of a row."""
     text = ""
     for table in tables.split("&"):
@@ -47,8 +50,8 @@ def scan_of(folder: Path, tables: str, **options: Any) -> Any:
         rows = zip(*CELLS.values(), strict=True)
         lines = [row.format(**dict(zip(CELLS, cells, strict=True))) for cells in rows]
         text += "\n".join([head, *lines]) + "\n"
-    (folder / "t.csv").write_text(text, encoding="utf-8")
-    return imported(folder / "t.csv", **{"x": "x", "u": "U", **options})
+    TABLE.write_text(text, encoding="utf-8")
+    return imported(TABLE, **{"x": "x", "u": "U", **options})
 
 
 LVM = "Channels\t2\t\nX0\t0.0\t0.0\n***End_of_Header***\t\t\nt\tx (mm)\tU (mV)\tComment~"
@@ -90,9 +93,9 @@ LVM = "Channels\t2\t\nX0\t0.0\t0.0\n***End_of_Header***\t\t\nt\tx (mm)\tU (mV)\t
         ("# x,U,V~{X},{U},{V}&# U,x,V~{U},{X},{V}", NO_UNITS, "again in line 17"),
     ],
 )
-def test_what_two_readings_of_a_table_could_mean_is_asked(tmp_path, tables, options, words):
+def test_what_two_readings_of_a_table_could_mean_is_asked(tables, options, words):
     with pytest.raises(InputError, match=words):
-        scan_of(tmp_path, tables, **options)
+        scan_of(tables, **options)
 
 
 @pytest.mark.parametrize(
@@ -121,17 +124,17 @@ def test_what_two_readings_of_a_table_could_mean_is_asked(tmp_path, tables, opti
         ("x (mm),U (mV)~{X},{U}\n# U here", {}),
     ],
 )
-def test_what_reads_well_is_read(tmp_path, tables, options):
-    scan = scan_of(tmp_path, tables, **options)
+def test_what_reads_well_is_read(tables, options):
+    scan = scan_of(tables, **options)
     np.testing.assert_allclose(scan.x, X * 1e-3, rtol=1e-12)
     np.testing.assert_allclose(scan.u_zz, U * 1e-3, rtol=1e-12)
 
 
-def test_an_option_settles_what_was_asked(tmp_path):
-    decimal = scan_of(tmp_path, "x (mm)\tU (1)~{WHOLE}\t{COUNT}", decimal=",")
+def test_an_option_settles_what_was_asked():
+    decimal = scan_of("x (mm)\tU (1)~{WHOLE}\t{COUNT}", decimal=",")
     assert decimal.u_zz[1] == 12.004
-    assert scan_of(tmp_path, "0,1~{X},{U}", **BY_NUMBER, skip_rows=0).x.size == N + 1
-    left = scan_of(tmp_path, "x (mm),U (mV)~{X},{LARGE}", missing=["-9.9E37"])
+    assert scan_of("0,1~{X},{U}", **BY_NUMBER, skip_rows=0).x.size == N + 1
+    left = scan_of("x (mm),U (mV)~{X},{LARGE}", missing=["-9.9E37"])
     assert np.flatnonzero(np.isnan(left.u_zz)).tolist() == [6]
 
 
@@ -162,22 +165,22 @@ def test_other_columns_of_a_table_in_memory_are_looked_at(name):
         ("x (Mm),U (mV)~{X},{U}", None, "mm meant"),
     ],
 )
-def test_a_unit_of_a_size_that_nobody_has_is_asked_about(tmp_path, tables, noise, words):
+def test_a_unit_of_a_size_that_nobody_has_is_asked_about(tables, noise, words):
     with pytest.warns(UnitWarning, match=words):
-        scan_of(tmp_path, tables, noise=noise)
+        scan_of(tables, noise=noise)
 
 
 @pytest.mark.parametrize("scatter", [0.0, 2e-3])
-def test_two_readings_at_each_place_of_a_repeat_are_named_with_what_differs(tmp_path, scatter):
+def test_two_readings_at_each_place_of_a_repeat_are_named_with_what_differs(scatter):
     rng = np.random.default_rng(1)
     x = np.tile(X, 4) + scatter * rng.normal(size=4 * N)
     depth = np.tile(np.repeat([0.3, 0.6], N), 2)
     columns = [x, depth, np.tile(U, 4), np.repeat([1, 2], 2 * N), np.ones(4 * N)]
     names = ["x", "depth", "U", "pass", "lab"]
-    np.savetxt(tmp_path / "t.csv", np.transpose(columns), delimiter=",", header=",".join(names))
+    np.savetxt(TABLE, np.transpose(columns), delimiter=",", header=",".join(names))
     frame = dict(zip(names[:4], columns, strict=False))
     options = {"x": "x", "u": "U", **NO_UNITS}
     named = "2 readings at each place of each repeat. Other columns that differ: depth."
-    for source in (frame, tmp_path / "t.csv"):
+    for source in (frame, TABLE):
         assert named in imported(source, repeat="pass", **options).notes
         assert "at each" not in imported(source, repeat=["pass", "depth"], **options).notes

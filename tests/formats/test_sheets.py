@@ -20,11 +20,13 @@ import memscal
 from memscal.errors import FormatError, InputError
 from memscal.formats.tables import sheets
 
+pytestmark = pytest.mark.usefixtures("folder")
+
 X = [-8.0, 0.0, 8.0]
 U = [0.1, 2.0, 0.2]
 
 
-def workbook(path: Path) -> Path:
+def workbook() -> str:
     """A cover, and a sheet with a title, merged heads, units, a time stamp and an error."""
     book = openpyxl.Workbook()
     book.active.title = "Info"
@@ -39,12 +41,12 @@ def workbook(path: Path) -> Path:
     for x, u in zip(X, U, strict=True):
         sheet.append([x, date(2024, 5, 12), u])
     sheet.append([9.0, None, "#N/A"])
-    book.save(path)
-    return path
+    book.save("rod.xlsx")
+    return "rod.xlsx"
 
 
-def test_a_sheet_of_a_workbook_is_read_below_its_title_and_named_by_its_rows(tmp_path):
-    book = workbook(tmp_path / "rod.xlsx")
+def test_a_sheet_of_a_workbook_is_read_below_its_title_and_named_by_its_rows():
+    book = workbook()
     scan = imported(book, sheet="Daten", x="x", u="U")
     np.testing.assert_allclose(scan.x, [-8e-3, 0, 8e-3, 9e-3])
     np.testing.assert_allclose(scan.u_zz, [0.1e-3, 2e-3, 0.2e-3, np.nan])
@@ -56,7 +58,7 @@ def test_a_sheet_of_a_workbook_is_read_below_its_title_and_named_by_its_rows(tmp
         imported(book, sheet="Data", x="x", u="U")
 
 
-def edited(path: Path, change: Any) -> Path:
+def edited(change: Any) -> str:
     """A hidden sheet and a visible one of x and U, which a change turns into another."""
     book = openpyxl.Workbook()
     for sheet, factor in ((book.active, 9), (book.create_sheet("new"), 1)):
@@ -65,8 +67,8 @@ def edited(path: Path, change: Any) -> Path:
             sheet.append([x, factor * u, "ok"])
     book.active.sheet_state = "hidden"
     change(book["new"])
-    book.save(path)
-    return path
+    book.save("a.xlsx")
+    return "a.xlsx"
 
 
 def hide(sheet: Any) -> None:
@@ -83,8 +85,8 @@ def hide(sheet: Any) -> None:
         (lambda sheet: sheet.merge_cells("C2:C4"), "Read 3 rows"),
     ],
 )
-def test_the_first_visible_sheet_is_read_with_its_hidden_rows_named(tmp_path, change, words):
-    scan = imported(edited(tmp_path / "a.xlsx", change), x="x", u="U")
+def test_the_first_visible_sheet_is_read_with_its_hidden_rows_named(change, words):
+    scan = imported(edited(change), x="x", u="U")
     np.testing.assert_allclose(scan.u_zz, [1e-3 * u for u in U])
     assert re.search(words, scan.notes)
 
@@ -101,21 +103,21 @@ def test_the_first_visible_sheet_is_read_with_its_hidden_rows_named(tmp_path, ch
         ),
     ],
 )
-def test_merged_cells_and_formulas_without_results_are_refused(tmp_path, change, words):
+def test_merged_cells_and_formulas_without_results_are_refused(change, words):
     with pytest.raises(FormatError, match=words):
-        imported(edited(tmp_path / "a.xlsx", change), x="x", u="U")
+        imported(edited(change), x="x", u="U")
 
 
-def test_a_formula_has_the_result_that_is_stored_and_an_empty_text_is_one(tmp_path):
-    path = edited(tmp_path / "a.xlsx", lambda sheet: sheet.__setitem__("B3", "=A3"))
+def test_a_formula_has_the_result_that_is_stored_and_an_empty_text_is_one():
+    path = edited(lambda sheet: sheet.__setitem__("B3", "=A3"))
     for stored, u in ((b' t="str"><f>A3</f><v></v>', np.nan), (b"><f>A3</f><v>2</v>", 2e-3)):
         parts = io.BytesIO()
         with zipfile.ZipFile(path) as packed, zipfile.ZipFile(parts, "w") as written:
             for name in packed.namelist():
                 text = packed.read(name).replace(b"><f>A3</f><v></v>", stored)
                 written.writestr(name, text)
-        (tmp_path / "b.xlsx").write_bytes(parts.getvalue())
-        scan = imported(tmp_path / "b.xlsx", x="x", u="U")
+        Path("b.xlsx").write_bytes(parts.getvalue())
+        scan = imported("b.xlsx", x="x", u="U")
         np.testing.assert_allclose(scan.u_zz[1], u)
 
 
@@ -140,14 +142,14 @@ DOCTYPE = b'<!DOCTYPE a [<!ENTITY b "bb">]>' + SHEET % b"&b;"
         (b"<a", "cannot be"),
     ],
 )
-def test_a_hostile_workbook_is_refused_before_it_takes_memory(tmp_path, monkeypatch, xml, words):
+def test_a_hostile_workbook_is_refused_before_it_takes_memory(monkeypatch, xml, words):
     limits = {"MOST_TAGS": 1000, "MOST_OTHER_TAGS": 1000, "MOST_FILE_BYTES": 2**20}
     for name, limit in limits.items():
         monkeypatch.setattr(sheets, name, limit)
     plain = io.BytesIO()
     book = openpyxl.Workbook()
     book.save(plain)
-    path = tmp_path / "hostile.xlsx"
+    path = Path("hostile.xlsx")
     with zipfile.ZipFile(plain) as source, zipfile.ZipFile(path, "w") as target:
         for name in source.namelist():
             target.writestr(name, xml if "sheet1" in name else source.read(name), 8)
@@ -155,22 +157,22 @@ def test_a_hostile_workbook_is_refused_before_it_takes_memory(tmp_path, monkeypa
         sheets.open_table(path)
 
 
-def test_parquet_is_read_with_the_units_of_its_fields(tmp_path):
+def test_parquet_is_read_with_the_units_of_its_fields():
     fields = [pa.field("x", pa.float32(), metadata={"units": "mm"}), pa.field("U [uV]", pa.int64())]
     table = pa.table([pa.array(X, pa.float32()), pa.array([1, None, 3])], schema=pa.schema(fields))
-    parquet.write_table(table, tmp_path / "rod.parquet")
-    scan = imported(tmp_path / "rod.parquet", x="x", u="U")
+    parquet.write_table(table, "rod.parquet")
+    scan = imported("rod.parquet", x="x", u="U")
     np.testing.assert_allclose(scan.x, [-8e-3, 0, 8e-3])
     np.testing.assert_allclose(scan.u_zz, [1e-6, np.nan, 3e-6])
     assert scan.source.file_name == "rod.parquet"
     columns = [pa.array(np.arange(5.0) * factor) for factor in (1, 1, 2)]
     twice = pa.Table.from_arrays(columns, names=["x", "u", "u"])
-    parquet.write_table(twice, tmp_path / "twice.parquet")
-    third = imported(tmp_path / "twice.parquet", x="x", u=3, x_unit="mm", u_unit="V")
+    parquet.write_table(twice, "twice.parquet")
+    third = imported("twice.parquet", x="x", u=3, x_unit="mm", u_unit="V")
     np.testing.assert_array_equal(third.u_zz, 2 * np.arange(5.0))
-    (tmp_path / "no.parquet").write_bytes(b"PAR1 and no more")
+    Path("no.parquet").write_bytes(b"PAR1 and no more")
     with pytest.raises(FormatError, match=r"no\.parquet cannot be read"):
-        imported(tmp_path / "no.parquet", x="x", u="u")
+        imported("no.parquet", x="x", u="u")
 
 
 @pytest.mark.parametrize(
@@ -223,8 +225,8 @@ def test_an_option_that_a_kind_of_table_has_no_use_for_is_refused(name, options,
         imported(name, x="x", u="u", **options)
 
 
-def test_a_workbook_without_openpyxl_names_the_extra(tmp_path, monkeypatch):
+def test_a_workbook_without_openpyxl_names_the_extra(monkeypatch):
     monkeypatch.setitem(sys.modules, "openpyxl", None)
-    (tmp_path / "b.xlsx").write_bytes(b"PK")
+    Path("b.xlsx").write_bytes(b"PK")
     with pytest.raises(InputError, match=r"openpyxl(.|\n)*memscal\[tables\]"):
-        imported(tmp_path / "b.xlsx", x="x", u="u")
+        imported("b.xlsx", x="x", u="u")

@@ -20,10 +20,12 @@ from memscal.model.checks import marked_texts
 from memscal.model.indenter import Rod, Sphere
 from memscal.model.scan import Scan
 
+pytestmark = pytest.mark.usefixtures("folder")
 
-def scan_table(path: Path, text: str, **options: Any) -> ImportedScan:
+
+def scan_table(text: str, **options: Any) -> ImportedScan:
     """Import a table with the usual options."""
-    table = path / "table.csv"
+    table = Path("table.csv")
     table.write_text(text, encoding="utf-8")
     given = {"x": "x", "u": "u", "x_unit": "mm", "u_unit": "mV", "load": 1.0}
     given |= {"film": make_film(), "indenter": Rod(radius=0.25e-3), **options}
@@ -36,8 +38,8 @@ def rows(*columns: Any, header: str, separator: str = ",") -> str:
     return "\n".join([header, *lines])
 
 
-def test_a_line_keeps_its_uneven_unsorted_positions(tmp_path):
-    found = scan_table(tmp_path, "x,u\n1.5,2\n-1,1\n0.25,3\n")
+def test_a_line_keeps_its_uneven_unsorted_positions():
+    found = scan_table("x,u\n1.5,2\n-1,1\n0.25,3\n")
     assert found.kind == "line"
     assert found.x.tolist() == [1.5e-3, -1e-3, 0.25e-3]
     assert found.u_zz.tolist() == [2e-3, 1e-3, 3e-3]
@@ -52,8 +54,8 @@ def test_a_line_keeps_its_uneven_unsorted_positions(tmp_path):
     ],
     ids=["forth and back", "mixed"],
 )
-def test_repeats_over_the_same_positions_become_rows(tmp_path, text):
-    found = scan_table(tmp_path, text, repeat="n")
+def test_repeats_over_the_same_positions_become_rows(text):
+    found = scan_table(text, repeat="n")
     assert found.kind == "repeats"
     assert found.x.tolist() == [0.0, 1e-3, 3e-3]
     np.testing.assert_allclose(
@@ -71,8 +73,8 @@ def test_repeats_over_the_same_positions_become_rows(tmp_path, text):
     ],
     ids=["scattered positions", "a row that is missing", "a position read twice"],
 )
-def test_other_repeats_are_points_as_they_stand_in_the_table(tmp_path, text):
-    found = scan_table(tmp_path, text, repeat="n")
+def test_other_repeats_are_points_as_they_stand_in_the_table(text):
+    found = scan_table(text, repeat="n")
     stated = np.loadtxt(text.splitlines(), delimiter=",", skiprows=1)
     assert found.kind == "points"
     np.testing.assert_allclose(found.x, stated[:, 0] * 1e-3, rtol=1e-12)
@@ -81,7 +83,7 @@ def test_other_repeats_are_points_as_they_stand_in_the_table(tmp_path, text):
     assert any("in 2 repeats at 3 places" in note.text for note in found.messages)
 
 
-def test_a_raster_is_points_and_its_places_and_steps_are_named(tmp_path):
+def test_a_raster_is_points_and_its_places_and_steps_are_named():
     """In random order, with three places missing and scattered positions."""
     rng = np.random.default_rng(3)
     place = rng.permutation(np.setdiff1d(np.arange(35), [4, 17, 30]))
@@ -89,7 +91,7 @@ def test_a_raster_is_points_and_its_places_and_steps_are_named(tmp_path):
     x = -4.0 + 0.5 * column + 5e-3 * rng.uniform(-1, 1, 32)
     y = 100.0 + 0.25 * row + 5e-3 * rng.uniform(-1, 1, 32)
     text = rows(x.tolist(), y.tolist(), rng.normal(size=32).tolist(), header="x,y,u")
-    found = scan_table(tmp_path, text, y="y")
+    found = scan_table(text, y="y")
     assert (found.kind, found.u_zz.shape) == ("points", (32,))
     np.testing.assert_allclose(found.y, y * 1e-3, rtol=1e-12)
     (note,) = [note.text for note in found.messages if "32 readings" in note.text]
@@ -142,9 +144,9 @@ NO_UNITS = {"x_unit": None, "u_unit": None}
         (f"x/mm,u (mV),u (V)\n{LINE}", NO_UNITS, r"columns 'u': u \(mV\), u \(V\)"),
     ],
 )
-def test_a_table_of_no_use_is_refused(tmp_path, text, options, words):
+def test_a_table_of_no_use_is_refused(text, options, words):
     with pytest.raises(InputError, match=words):
-        scan_table(tmp_path, text, **options)
+        scan_table(text, **options)
 
 
 @pytest.mark.parametrize(
@@ -159,39 +161,39 @@ def test_a_table_of_no_use_is_refused(tmp_path, text, options, words):
     ],
 )
 @pytest.mark.parametrize("head", ["u/{}", "u ({})", "u[{}]"])
-def test_readings_of_any_unit_state_it_in_their_head(tmp_path, unit, si, factor, head):
+def test_readings_of_any_unit_state_it_in_their_head(unit, si, factor, head):
     text = f"x,{head.format(unit)}\n0,1\n1,2\n"
-    found = scan_table(tmp_path, text, u_unit=None, film=None, indenter=None, load=None)
+    found = scan_table(text, u_unit=None, film=None, indenter=None, load=None)
     assert found.unit == si
     np.testing.assert_allclose(found.u_zz, [factor, 2 * factor], rtol=1e-15)
     assert (found.film, found.indenter, found.load) == (None, None, None)
 
 
-def test_the_load_comes_from_the_option_or_the_median_of_its_column(tmp_path):
+def test_the_load_comes_from_the_option_or_the_median_of_its_column():
     text = "x,u,f\n0,1,990\n1,2,1000\n2,2,1030\n"
-    found = scan_table(tmp_path, text, load=None, load_column="f", load_unit="mN")
+    found = scan_table(text, load=None, load_column="f", load_unit="mN")
     assert found.load == 1.0
     np.testing.assert_allclose(found.normal_load, [0.99, 1.0, 1.03])
-    assert scan_table(tmp_path, text, load=None).load is None
-    assert scan_table(tmp_path, text, load_column="f", load_unit="mN").load == 1.0
+    assert scan_table(text, load=None).load is None
+    assert scan_table(text, load_column="f", load_unit="mN").load == 1.0
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_a_line_at_several_loads_is_numbered_by_them(tmp_path, seed):
+def test_a_line_at_several_loads_is_numbered_by_them(seed):
     rng = np.random.default_rng(seed)
     loads = rng.permutation(np.repeat([0.02, 0.05, 0.1], 11)) * rng.normal(1, 0.01, 33)
     x = np.tile(np.arange(11.0), 3)
     text = rows(x.tolist(), loads.tolist(), loads.tolist(), header="x,u,f")
-    scan = scan_table(tmp_path, text, load=None, load_column="f")
+    scan = scan_table(text, load=None, load_column="f")
     medians = [np.median(scan.normal_load[scan.passes == i]) for i in range(3)]
     np.testing.assert_allclose(medians, [0.02, 0.05, 0.1], rtol=0.02)
     assert "3 lines: one for each of the loads of 0.0" in scan.notes
-    one = scan_table(tmp_path, text.replace("x,u,f", "x,f,u"), load=None)
+    one = scan_table(text.replace("x,u,f", "x,f,u"), load=None)
     assert not one.passes.any()
 
 
-def test_rows_without_a_position_are_left_out_and_named_and_a_header_may_be(tmp_path):
-    found = scan_table(tmp_path, "0,9,1\n,7,7\n1,8,\n", x="1", u=3)
+def test_rows_without_a_position_are_left_out_and_named_and_a_header_may_be():
+    found = scan_table("0,9,1\n,7,7\n1,8,\n", x="1", u=3)
     np.testing.assert_array_equal(found.u_zz, [1e-3, np.nan])
     assert any("they have no position: line" in note.text for note in found.messages)
 
@@ -214,8 +216,8 @@ def test_rows_without_a_position_are_left_out_and_named_and_a_header_may_be(tmp_
         ('a,b,c\n"2 m/s","",""\nt,x,u\ns,mm,mV\n0,.5,1.25\n1,1.5,2.5\n', {"x_unit": None}),
     ],
 )
-def test_every_dialect_gives_the_same_numbers(tmp_path, text, options):
-    found = scan_table(tmp_path, text, film=None, **options)
+def test_every_dialect_gives_the_same_numbers(text, options):
+    found = scan_table(text, film=None, **options)
     assert found.x.tolist() == [0.5e-3, 1.5e-3]
     assert found.u_zz.tolist() == [1.25e-3, 2.5e-3]
 
@@ -228,12 +230,12 @@ EXPORT = (
 
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "utf-16-be", "cp1252"])
 @pytest.mark.parametrize("ends", ["\n", "\r\n", "\r"])
-def test_an_export_with_preamble_and_units_is_read_as_it_is(tmp_path, encoding, ends):
+def test_an_export_with_preamble_and_units_is_read_as_it_is(encoding, ends):
     content = EXPORT.replace("\n", ends).encode(encoding)
     mark = b"\xfe\xff" if encoding == "utf-16-be" else b""
-    (tmp_path / "t.csv").write_bytes(mark + content)
+    Path("t.csv").write_bytes(mark + content)
     layout = TableLayout(missing=["N.A.", "-9999"])
-    scan = import_table(tmp_path / "t.csv", x="Weg x", u="Spannung", layout=layout)
+    scan = import_table("t.csv", x="Weg x", u="Spannung", layout=layout)
     np.testing.assert_allclose(scan.x, [-8e-3, -7e-3, 0, 8e-3])
     np.testing.assert_allclose(scan.u_zz, [100.5e-6, np.nan, np.nan, 200e-6])
     for words in (
@@ -249,7 +251,7 @@ def test_an_export_with_preamble_and_units_is_read_as_it_is(tmp_path, encoding, 
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_wrong_cells_are_counted_and_the_first_five_named_by_their_lines(tmp_path, seed):
+def test_wrong_cells_are_counted_and_the_first_five_named_by_their_lines(seed):
     """Wherever they stand, the first row of numbers included, and in blocks read in either way."""
     rng = np.random.default_rng(seed)
     lines = [f"{i},{i}" for i in range(40_000)]
@@ -262,21 +264,21 @@ def test_wrong_cells_are_counted_and_the_first_five_named_by_their_lines(tmp_pat
     text = "made by hand\n\nx,u\n" + "\n".join(lines)
     expected = ", ".join(f"{n} \\('OVL'\\)" for n in named) + " and 7 more"
     with pytest.raises(FormatError, match=expected):
-        scan_table(tmp_path, text, film=None)
+        scan_table(text, film=None)
 
 
-def test_the_same_unit_in_other_letters_does_not_contradict(tmp_path):
+def test_the_same_unit_in_other_letters_does_not_contradict():
     text = "x (µm),u [millivolt]\n0,1\n1e3,2\n2e3,1\n"
-    scan = scan_table(tmp_path, text, x_unit="um")
+    scan = scan_table(text, x_unit="um")
     np.testing.assert_allclose(scan.x, [0, 1e-3, 2e-3])
 
 
-def test_uncertainties_are_a_column_or_one_number_in_the_unit_of_the_readings(tmp_path):
+def test_uncertainties_are_a_column_or_one_number_in_the_unit_of_the_readings():
     text = "x,u,e [uV]\n0,1,30\n1,2,40\n2,1,50\n"
-    column = scan_table(tmp_path, text, u_errors="e")
+    column = scan_table(text, u_errors="e")
     np.testing.assert_allclose(column.u_zz_errors, [3e-5, 4e-5, 5e-5])
     assert "uncertainty of each reading: 0.04 mV (median)" in column.notes
-    np.testing.assert_allclose(scan_table(tmp_path, text, noise=0.04).u_zz_errors, np.full(3, 4e-5))
+    np.testing.assert_allclose(scan_table(text, noise=0.04).u_zz_errors, np.full(3, 4e-5))
 
 
 @pytest.mark.parametrize(
@@ -287,8 +289,8 @@ def test_uncertainties_are_a_column_or_one_number_in_the_unit_of_the_readings(tm
         ({"x": None, "y": "a"}, "y"),
     ],
 )
-def test_a_line_of_two_columns_runs_along_the_one_that_spreads(tmp_path, options, direction):
-    scan = scan_table(tmp_path, "a,b,u\n-2,5.001,1\n0,5,2\n3,4.999,1\n", **options)
+def test_a_line_of_two_columns_runs_along_the_one_that_spreads(options, direction):
+    scan = scan_table("a,b,u\n-2,5.001,1\n0,5,2\n3,4.999,1\n", **options)
     assert (scan.kind, scan.direction) == ("line", direction)
     np.testing.assert_allclose(scan.x, [-2e-3, 0, 3e-3])
 
@@ -298,7 +300,6 @@ def test_a_line_of_two_columns_runs_along_the_one_that_spreads(tmp_path, options
     [
         ({"thickness": 1.5}, "1.5 m. Probably 1.5 mm was meant"),
         ({"thickness": 2e3}, "2000 um"),
-        ({"young_modulus": 1.8}, "Young's modulus is 1.8 Pa. Probably 1.8 MPa was meant"),
     ],
 )
 def test_a_film_that_none_has_is_warned_of_with_the_unit_that_was_meant(changes, words):
@@ -306,21 +307,19 @@ def test_a_film_that_none_has_is_warned_of_with_the_unit_that_was_meant(changes,
         Scan(x=[0, 1e-3], u_zz=[0, 1], film=make_film(**changes))
 
 
-def reference_table(path: Path, text: str, **options: Any) -> Any:
+def reference_table(text: str, **options: Any) -> Any:
     """Import a FEM table with the usual options."""
-    table = path / "fem.csv"
+    table = Path("fem.csv")
     table.write_text(text)
     given = {"r": "r", "sigma": "s", "r_unit": "mm", "sigma_unit": "MPa", "load": 1.0, **options}
     return read_reference_table(table, **given)
 
 
-def test_a_fem_table_is_sorted_and_converted_and_its_force_reported(tmp_path):
+def test_a_fem_table_is_sorted_and_converted_and_its_force_reported():
     r = np.linspace(0, 8, 401)
     s = np.exp(-(r**2) / 2) / (2 * np.pi)  # 1 N with r in mm and s in MPa
     order = np.random.default_rng(1).permutation(r.size)
-    found = reference_table(
-        tmp_path, rows(r[order].tolist(), (-s[order]).tolist(), header="r,s"), sign=-1
-    )
+    found = reference_table(rows(r[order].tolist(), (-s[order]).tolist(), header="r,s"), sign=-1)
     np.testing.assert_allclose(found.profile.r, r * 1e-3, rtol=1e-14)
     np.testing.assert_allclose(found.profile.sigma_zz, s * 1e6, rtol=1e-14)
     assert any("sorted by radius" in note.text for note in found.notes)
@@ -336,26 +335,26 @@ def test_a_fem_table_is_sorted_and_converted_and_its_force_reported(tmp_path):
     ("r,s\n0,2\n1,1\n", {"load": 3.0, "sign": 0}, "Give 1 or -1"),
     ("r,s\n0,2\n1,1\n", {"load": 3.0, "shear_sign": 0}, "Give 1 or -1"),
 ])  # fmt: skip
-def test_a_fem_table_that_cannot_be_used_is_refused(tmp_path, text, options, words):
+def test_a_fem_table_that_cannot_be_used_is_refused(text, options, words):
     with pytest.raises(InputError, match=words):
-        reference_table(tmp_path, text, **options)
+        reference_table(text, **options)
 
 
-def test_nodes_given_twice_are_averaged_and_reported(tmp_path):
-    found = reference_table(tmp_path, "r,s\n0,2\n1,1.1\n1,0.9\n2,0.1\n", load=7.0)
+def test_nodes_given_twice_are_averaged_and_reported():
+    found = reference_table("r,s\n0,2\n1,1.1\n1,0.9\n2,0.1\n", load=7.0)
     assert found.profile.sigma_zz.tolist() == [2e6, 1e6, 0.1e6]
     assert any("1 rows repeat" in note.text and "0.05" in note.text for note in found.notes)
 
 
-def test_the_shear_sign_turns_the_stress_component_into_the_traction_on_the_film(tmp_path):
+def test_the_shear_sign_turns_the_stress_component_into_the_traction_on_the_film():
     """Traction is stress times normal; the film's lower face has the normal -z."""
     shear = 0.3
     table = f"r,s,t\n0,-2,0\n1,-1,{shear}\n"
-    kept = reference_table(tmp_path, table, sign=-1, shear="t", load=3.0).profile
+    kept = reference_table(table, sign=-1, shear="t", load=3.0).profile
     assert kept.sigma_rz.tolist() == [0.0, 0.3e6]
     stress = np.array([[0, 0, shear], [0, 0, 0], [shear, 0, -1.0]])
     traction = stress @ [0, 0, -1.0]
-    found = reference_table(tmp_path, table, sign=-1, shear="t", shear_sign=-1, load=3.0)
+    found = reference_table(table, sign=-1, shear="t", shear_sign=-1, load=3.0)
     assert found.profile.sigma_rz[1] == pytest.approx(traction[0] * 1e6)
     # The base pushes up on what is compressed: the traction is the (positive) pressure.
     assert found.profile.sigma_zz[1] == pytest.approx(traction[2] * 1e6)
@@ -368,39 +367,39 @@ def gaussian_table(reach: float, factor: float = 1.0) -> str:
     return rows(r.tolist(), s.tolist(), header="r,s")
 
 
-def test_the_force_of_a_table_is_as_good_as_its_radii(tmp_path):
-    found = reference_table(tmp_path, gaussian_table(8.0))
+def test_the_force_of_a_table_is_as_good_as_its_radii():
+    found = reference_table(gaussian_table(8.0))
     assert found.profile.force == pytest.approx(1.0, abs=1e-6)
     assert not any(note.severity == "warning" for note in found.notes)
     assert found.profile.notes.splitlines() == marked_texts(found.notes)
 
 
 @pytest.mark.parametrize("factor", [1e-6, 1e-3, 0.4, 2.5, 1e3])
-def test_a_force_far_from_the_load_is_refused_as_a_wrong_unit(tmp_path, factor):
+def test_a_force_far_from_the_load_is_refused_as_a_wrong_unit(factor):
     with pytest.raises(InputError, match=r"times the load(.|\n)*\"MPa\"(.|\n)*\"mm\"(.|\n)*sign"):
-        reference_table(tmp_path, gaussian_table(8.0, factor))
+        reference_table(gaussian_table(8.0, factor))
 
 
-def test_a_table_that_ends_early_is_warned_of_and_not_refused(tmp_path):
+def test_a_table_that_ends_early_is_warned_of_and_not_refused():
     """Within one standard deviation a Gaussian carries 1 - exp(-1/2) of its force."""
-    found = reference_table(tmp_path, gaussian_table(1.0))
+    found = reference_table(gaussian_table(1.0))
     assert found.profile.force == pytest.approx(1 - np.exp(-0.5), rel=1e-6)
     (note,) = [note for note in found.notes if note.severity == "warning"]
     assert "ends with 60.7% of its maximum left: extend it" in note.text
     with pytest.raises(InputError, match="times the load"):
-        reference_table(tmp_path, gaussian_table(1.0), load=0.1)
+        reference_table(gaussian_table(1.0), load=0.1)
 
 
-def test_a_voltage_that_falls_under_compression_can_be_turned(tmp_path):
-    found = scan_table(tmp_path, "x,u,s\n0,-1,5\n1,-2,6\n", u_sign=-1, u_xz="s")
+def test_a_voltage_that_falls_under_compression_can_be_turned():
+    found = scan_table("x,u,s\n0,-1,5\n1,-2,6\n", u_sign=-1, u_xz="s")
     assert found.u_zz.tolist() == [1e-3, 2e-3]
     assert found.channels["u_xz"].tolist() == [5e-3, 6e-3]
     assert "The sign of u_zz was changed." in found.notes
 
 
-def test_what_the_table_says_at_its_head_travels_with_the_scan(tmp_path):
+def test_what_the_table_says_at_its_head_travels_with_the_scan():
     head = "# SYNTHETIC: made up\x1b[2J\n%  rod 3\n#\n" + "# " + "z" * 5000 + "\n" + "# more\n" * 40
-    found = scan_table(tmp_path, head + "x,u\n0,1\n# within the table\n1,2\n")
+    found = scan_table(head + "x,u\n0,1\n# within the table\n1,2\n")
     lines = found.notes.splitlines()
     assert lines == marked_texts(found.messages)
     assert found.source.sha256 in lines[0]
@@ -411,18 +410,18 @@ def test_what_the_table_says_at_its_head_travels_with_the_scan(tmp_path):
     assert max(map(len, lines)) < 400
 
 
-def test_an_error_of_a_spreadsheet_is_a_cell_and_a_comment_among_rows_is_told(tmp_path):
+def test_an_error_of_a_spreadsheet_is_a_cell_and_a_comment_among_rows_is_told():
     errors = "t,x,u\n" + "\n".join(f"{'#N/A' if x % 2 else x},{x},1" for x in range(9))
-    assert scan_table(tmp_path, errors).x.size == 9
-    found = scan_table(tmp_path, "x,u\n0,1\n1,2\n#2,3\n3,4\n4,5\n")
+    assert scan_table(errors).x.size == 9
+    found = scan_table("x,u\n0,1\n1,2\n#2,3\n3,4\n4,5\n")
     assert found.x.size == 4
     assert any("Left out as comments: line 4." in text for text in marked_texts(found.messages))
 
 
 @pytest.mark.parametrize(("apex", "lowest"), [(0.0, 0.0), (3.0, 3.0), (0.4, 0.5), (6.0, 6.0)])
-def test_a_tip_that_is_lowest_away_from_its_axis_is_warned_of(tmp_path, apex, lowest):
+def test_a_tip_that_is_lowest_away_from_its_axis_is_warned_of(apex, lowest):
     r = np.arange(0.0, 6.5, 0.5)
-    table = tmp_path / "tip.csv"
+    table = Path("tip.csv")
     table.write_text(rows(*map(np.ndarray.tolist, (r, 5 * (r - apex) ** 2)), header="r,z"))
     with warnings.catch_warnings(record=True) as seen:
         warnings.simplefilter("always")
@@ -461,20 +460,20 @@ def test_a_load_that_would_sink_the_indenter_through_the_film_is_refused(
 
 @pytest.mark.parametrize(("value", "load"), [(None, 1.0), (3.0, 3.0)])
 @pytest.mark.parametrize("unit", ["s (MPa)", "s"])
-def test_a_reference_without_a_load_is_scaled_by_its_own_integral(tmp_path, unit, value, load):
-    r = np.linspace(0.0, 8.0, 81)
-    sigma = np.exp(-(r**2) / 2) / (2 * np.pi)
-    table = rows(r.tolist(), sigma.tolist(), header=f"r (mm),{unit}")
-    (tmp_path / "p.csv").write_text(table)
+def test_a_reference_without_a_load_is_scaled_by_its_own_integral(unit, value, load):
+    def read(reach: float, value: float | None) -> Any:
+        Path("p.csv").write_text(gaussian_table(reach).replace("r,s", f"r (mm),{unit}"))
+        return read_reference_table("p.csv", r="r", sigma="s", value=value)
+
     if value is None and unit == "s":
         with pytest.raises(InputError, match="states no unit"):
-            read_reference_table(tmp_path / "p.csv", r="r", sigma="s")
+            read(8.0, value)
         return
-    found = read_reference_table(tmp_path / "p.csv", r="r", sigma="s", value=value).profile
+    found = read(8.0, value).profile
     assert found.load == pytest.approx(load, rel=1e-5)
+    sigma = np.exp(-((1e3 * found.r) ** 2) / 2) / (2 * np.pi)
     np.testing.assert_allclose(found.sigma_zz, 1e6 * load * sigma, rtol=1e-5)
-    (tmp_path / "p.csv").write_text("\n".join(table.splitlines()[:20]))
-    cut = read_reference_table(tmp_path / "p.csv", r="r", sigma="s", value=value or 1.0)
+    cut = read(1.8, value or 1.0)
     assert any("19.8% of the largest stress is left" in n.text for n in cut.notes)
 
 
@@ -507,8 +506,8 @@ def test_dead_rows_at_the_edge_of_a_raster_are_left_out_and_named(dead, left, pl
     assert ("rows of zeros" in found.notes) is bool(left)
 
 
-def test_a_typographic_minus_is_one_and_d_begins_a_power_of_ten(tmp_path):
-    found = scan_table(tmp_path, "x,u\n−1,1\n0,1D5\n1,2\n2,3\n", missing=["1d5"])
+def test_a_typographic_minus_is_one_and_d_begins_a_power_of_ten():
+    found = scan_table("x,u\n−1,1\n0,1D5\n1,2\n2,3\n", missing=["1d5"])
     assert found.x[0] == -1e-3
     assert np.isnan(found.u_zz).sum() == 1
 
