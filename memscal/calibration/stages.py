@@ -24,9 +24,9 @@ from memscal.errors import FitError, InputError, MemscalError
 from memscal.estimation import points
 from memscal.estimation.band import Band, beyond_zeros, find_band
 from memscal.estimation.bayesian import Bayesian
-from memscal.estimation.model_tests import CentresApart, repeat_centres_test
 from memscal.estimation.profile import ProfileEstimate, constrained_profile, estimate_profile
 from memscal.estimation.reference_spectra import expected_spectra, reference_spectra
+from memscal.estimation.runs import CentresApart, repeat_centres_test
 from memscal.estimation.smoothing import SmoothedProfile, smooth_profile
 from memscal.mechanics.contact import BaseStress
 from memscal.model.arrays import FloatArray, array_record, value_record

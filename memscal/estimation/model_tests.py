@@ -15,7 +15,7 @@ from memscal.estimation import residuals
 from memscal.estimation.bayesian import weigh_departures
 from memscal.estimation.departures import ReducedScan, departure_basis
 from memscal.estimation.gaussian import fit_gaussian_to_points
-from memscal.estimation.points import FEWEST_AT_CEILING, MINIMUM_POSITIONS, agreeing_tops
+from memscal.estimation.points import FEWEST_AT_CEILING, agreeing_tops
 from memscal.estimation.profile import NUMERICAL_FLOOR, ProfileEstimate
 from memscal.estimation.residuals import FEWEST_RESIDUALS, TestOutcome
 from memscal.estimation.voltage_map import evenly, triangular
@@ -26,8 +26,6 @@ from memscal.model.checks import FALSE_ALARM
 _MOST_FOLDS = 10
 #: Loads that differ by less of their mean are one load, recorded with scatter.
 _SAME_LOAD = 0.05
-#: Columns are dependent below this share of the largest.
-_DEPENDENT = 1e-10
 
 
 @value_record
@@ -103,95 +101,6 @@ def _predict(
         return float(chdtrc(degrees, degrees * value)), value, degrees, None
     value /= max(others / others_degrees, TINY)
     return float(fdtrc(degrees, others_degrees, value)), value, degrees, others_degrees
-
-
-@value_record
-class CentresApart(TestOutcome):
-    """Test of whether the repeats of a line have centres of their own: an F ratio."""
-
-    distance: float  # of the two repeats of a scan that are farthest apart, in m
-
-
-def repeat_centres_test(estimate: ProfileEstimate) -> CentresApart | None:
-    """Shift each repeat of line scans, whatever G; ``None`` without repeats that can be shifted."""
-    points = estimate.points
-    repeats, start, readings = np.unique(points.repeat, return_index=True, return_counts=True)
-    scan = points.scan[start]
-    if points.planar or repeats.size == points.scans or readings.min() < MINIMUM_POSITIONS:
-        return None
-    model = residuals.free_model(estimate, clip_outliers=True)
-    along = points.along(points.positions)
-    shift = estimate.model.shift_derivative(estimate.gaussian.geometry, estimate.kernel)
-    # Each has a baseline and a drift of its own, as it has where it has a centre of its own.
-    own = [
-        np.ones_like(along),
-        along / np.abs(along).max(),
-        points.along(shift),
-    ]
-    # The first repeat of each scan has the scan's centre, the others are shifted from it.
-    shifted = np.diff(scan, prepend=-1) == 0
-    common, apart, links = _without_repeats(estimate, model, np.stack(own, axis=1), shifted)
-    size = np.linalg.norm(model.design, axis=0)
-    stack = np.vstack(apart)
-    without, rank = _left_over(np.vstack(common), size)
-    left, _ = _left_over(stack, size)
-    count = int(shifted.sum())
-    degrees = model.data.size - 2 * repeats.size - rank - count
-    if degrees < FEWEST_RESIDUALS or left == 0.0:
-        return None
-    coefficients = np.linalg.lstsq(stack[:, :-1] / size, stack[:, -1], rcond=_DEPENDENT)[0] / size
-    shifts = []
-    for link in links:
-        shifting = link[:, : len(link)]
-        others = link[:, len(link) : -1]
-        shifts.append(np.linalg.solve(shifting, link[:, -1] - others @ coefficients))
-    places = np.zeros(repeats.size)
-    places[shifted] = np.concatenate(shifts)
-    # Over the scatter that is left: exact whether the noise is stated or not.
-    value = max(without - left, 0.0) / count / (left / degrees)
-    return CentresApart(
-        **vars(residuals.ratio_outcome(value, count, degrees)),
-        distance=max(float(np.ptp(places[scan == i])) for i in range(points.scans)),
-    )
-
-
-def _without_repeats(
-    estimate: ProfileEstimate,
-    model: residuals.FreeModel,
-    own: FloatArray,
-    shifted: BoolArray,
-) -> tuple[list[FloatArray], list[FloatArray], list[FloatArray]]:
-    """Eliminate what is each repeat's own (n, 3), with one centre and with shifts; what links both.
-
-    From triangular factors: of repeats one by one, unless their noise is correlated.
-    """
-    points = estimate.points
-    weights = estimate.weights / estimate.outlier_weight
-    repeats = np.unique(points.repeat)
-    independent = points.decorrelation is None
-    numbers = range(repeats.size)
-    common = []
-    apart = []
-    links = []
-    for group in [[i] for i in numbers] if independent else [[*numbers]]:
-        inside = points.repeat[model.point] == repeats[group[0]]
-        rows = np.flatnonzero(inside) if independent else np.arange(model.point.size)
-        lines = []
-        shifts = []
-        for i in group:
-            columns = own * (points.repeat == repeats[i])[:, None]
-            columns = points.standardised(columns, weights)[model.point[rows]]
-            lines.append(columns[:, :2])
-            if shifted[i]:
-                shifts.append(columns[:, 2:])
-        first = 2 * len(lines)
-        last = first + len(shifts)
-        columns = [*lines, *shifts, model.design[rows], model.data[rows, None]]
-        root = triangular(np.hstack(columns))
-        common.append(root[first:, last:])
-        apart.append(root[last:, last:])
-        links.append(root[first:last, first:])
-    return common, apart, links
 
 
 def _left_over(root: FloatArray, size: FloatArray) -> tuple[float, int]:

@@ -9,11 +9,11 @@ from scipy.special import fdtrc
 
 from memscal.axisymmetry.kernels import gaussian_transfer_slope
 from memscal.estimation import residuals
-from memscal.estimation.points import grouped
+from memscal.estimation.points import MINIMUM_POSITIONS, ScanPoints, grouped
 from memscal.estimation.profile import NUMERICAL_FLOOR, ProfileEstimate
 from memscal.estimation.residuals import FEWEST_RESIDUALS, TestOutcome, ratio_outcome
 from memscal.estimation.voltage_map import triangular
-from memscal.model.arrays import FloatArray, IndexArray, array_record
+from memscal.model.arrays import TINY, FloatArray, IndexArray, array_record, value_record
 
 #: Repeats of one branch differ from each other, too, beyond this p-value.
 _WANDERS = 0.05
@@ -40,7 +40,8 @@ class _Fit:
         weights = estimate.weights / estimate.outlier_weight
         added = estimate.points.standardised(columns, weights)[model.point]
         design = np.hstack([model.design, added])
-        root = np.asarray(np.linalg.pinv(triangular(design), rcond=_DEPENDENT), dtype=np.float64)
+        size = np.maximum(np.linalg.norm(design, axis=0), TINY)
+        root = np.linalg.pinv(triangular(design) / size, rcond=_DEPENDENT) / size[:, None]
         basis = design @ root
         along = basis.T @ model.data
         left = model.data - basis @ along
@@ -58,6 +59,45 @@ class _Fit:
         """Test sums of coefficients, by those of the root, as one of so many tests: an F ratio."""
         z = np.linalg.lstsq(rows, values, rcond=None)[0]
         return ratio_outcome(float(z @ z) / len(rows), len(rows), self.degrees, of)
+
+
+@value_record
+class CentresApart(TestOutcome):
+    """Test of whether the repeats of a line have centres of their own: an F ratio."""
+
+    distance: float  # of the two repeats of a scan that are farthest apart, in m
+
+
+def repeat_centres_test(estimate: ProfileEstimate) -> CentresApart | None:
+    """Shift each repeat of line scans, whatever G; ``None`` without repeats that can be shifted."""
+    points = estimate.points
+    first, number, readings = _runs(points)
+    count = readings.size
+    if points.planar or count == points.scans or readings.min() < MINIMUM_POSITIONS:
+        return None
+    own = np.equal.outer(number, np.arange(count)).astype(np.float64)
+    along = points.along(points.positions)[:, None]
+    shift = estimate.model.shift_derivative(estimate.gaussian.geometry, estimate.kernel)
+    # The first repeat of each scan has the scan's centre, the others are shifted from it.  Each has
+    # a baseline and a drift of its own, as it has where it has a centre of its own.
+    scan = points.scan[first]
+    shifted = np.diff(scan, prepend=-1) == 0
+    shifts = own[:, shifted] * points.along(shift)[:, None]
+    fit = _Fit.of(estimate, np.hstack([own, own * along, shifts]))
+    if fit is None:
+        return None
+    places = np.zeros(count)
+    moved = fit.coefficients[-shifts.shape[1] :]
+    places[shifted] = moved
+    return CentresApart(
+        **vars(fit.tested(moved, fit.root[-moved.size :])),
+        distance=max(float(np.ptp(places[scan == i])) for i in range(points.scans)),
+    )
+
+
+def _runs(points: ScanPoints) -> tuple[IndexArray, IndexArray, IndexArray]:
+    """First reading of each run, the number of the run of each reading, and its readings."""
+    return np.unique(points.repeat, return_index=True, return_inverse=True, return_counts=True)[1:]
 
 
 @array_record
@@ -153,8 +193,8 @@ class RunsApart:
 def compare_runs(estimate: ProfileEstimate) -> RunsApart | None:
     """Compare the runs' baselines, each with a gain of its own, and what is left of each."""
     points = estimate.points
-    runs, start, number = np.unique(points.repeat, return_index=True, return_inverse=True)
-    count = runs.size
+    start, number, readings = _runs(points)
+    count = readings.size
     if count == 1:
         return None
     own = np.equal.outer(number, np.arange(count)).astype(np.float64)
