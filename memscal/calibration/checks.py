@@ -232,9 +232,7 @@ def _field_shape(solution: Solution, results: Results) -> list[QualityCheck]:
     g = solution.deconvolution.g.image
     checks = []
     if results.field_errors is not None:
-        # Farther out G is tapered to zero.
-        inside = solution.deconvolution.g.grid.radius < fields.support / 2
-        lobe = float(np.max((-g - _SURE * results.field_errors[1])[inside]) / g.max())
+        lobe = float(np.max(-g - _SURE * results.field_errors[1]) / g.max())
         meaning = (
             f"Depth of the deepest lobe of G over the plane beyond {_SURE:g} standard "
             "uncertainties, over the largest G. A failure means that G has ripples that its "
@@ -482,8 +480,8 @@ def _hysteresis(solution: Solution) -> list[QualityCheck]:
         ("the baseline", reading.scale, reading.unit),
     )
     differences = []
-    pairs = zip(branches.values, branches.errors, strict=True)
-    for (name, scale, unit), (value, error) in zip(units, pairs, strict=False):
+    each = zip(units, branches.values, branches.errors, strict=False)
+    for (name, scale, unit), value, error in each:
         differences.append(f"of {name} by {format_measured(value / scale, error / scale, unit)}")
     meaning = (
         "Differences between approach and retreat over the scatter that is left: an F ratio. They "

@@ -102,8 +102,6 @@ def _require_parity(
 _STARTING_WIDTHS = (0.1, 0.3, 0.8)
 #: Of more points as many are fitted at first.
 _MOST_AT_START = 5000
-#: Centres are tried in gaps of so many steps, too, where readings are missing.
-_GAP = 1.5
 #: Where no film blurs: so many from half a step to a quarter of the span.
 _SOURCE_WIDTHS = 8
 
@@ -192,9 +190,7 @@ def _trial_centres(model: ForwardModel) -> FloatArray:
         margin = unique.size // 10
         central = unique[margin : unique.size - margin]
         if points.missing:  # at a ceiling, those at the centre
-            gaps = np.flatnonzero(np.diff(central) > _GAP * points.step)
-            filled = [np.arange(central[i], central[i + 1], points.step)[1:] for i in gaps]
-            central = np.sort(np.concatenate([central, *filled]))
+            central = np.union1d(central, np.arange(central[0], central[-1], points.step))
         along[axis] = central[:: int(np.ceil(central.size / (12 if points.planar else 40)))]
     return np.stack([axis.ravel() for axis in np.meshgrid(*along)], axis=1)
 
