@@ -3,6 +3,7 @@
 import dataclasses
 import hashlib
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
@@ -13,7 +14,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from memscal.apparatus import load_apparatus
+from memscal.apparatus import ApparatusFunction, load_apparatus
 from memscal.errors import FormatError, InputError, OutputError, UnitError
 from memscal.extensions.meshes.mesh_files import write_mesh
 from memscal.formats.artifact import write_artifact
@@ -25,11 +26,19 @@ from memscal.model.field_mesh import FieldMesh
 from memscal.model.indenter import Sphere
 from memscal.model.provenance import SourceFile
 
+pytestmark = pytest.mark.usefixtures("folder")
+
+
+def kept(**fields: Any) -> ApparatusFunction:
+    """Write an artifact and read it."""
+    write_artifact(make_artifact(**fields), "a.h5")
+    return load_apparatus("a.h5")
+
 
 @pytest.mark.parametrize("kind", ["line", "repeats", "raster", "points"])
 @pytest.mark.parametrize("direction", ["x", "y"])
-def test_all_that_a_scan_may_state_comes_back(tmp_path, kind, direction):
-    path = tmp_path / "scan.h5"
+def test_all_that_a_scan_may_state_comes_back(kind, direction):
+    path = Path("scan.h5")
     plain = make_scan(kind)
     film = dataclasses.replace(plain.film, name="film A")
     count = np.arange(plain.u_zz.size).reshape(plain.u_zz.shape)
@@ -83,13 +92,13 @@ ABSENT = "sigma_rz depth contact_radius stick_radius friction_coefficient film i
     ],
     ids=["whole", "only a table"],
 )
-def test_a_reference_comes_back(tmp_path, profile):
-    write_reference(profile, tmp_path / "a.h5")
-    assert_same(read_reference(tmp_path / "a.h5"), profile, but=("source",))
+def test_a_reference_comes_back(profile):
+    write_reference(profile, "a.h5")
+    assert_same(read_reference("a.h5"), profile, but=("source",))
 
 
-def test_a_reference_in_a_scan_without_parameters_takes_its_load_but_no_film(tmp_path):
-    path = tmp_path / "scan.h5"
+def test_a_reference_in_a_scan_without_parameters_takes_its_load_but_no_film():
+    path = Path("scan.h5")
     write_scan(make_scan(load=2.5), path)
     with h5py.File(path, "r+") as file:
         del file["/entry/reference_parameters"], file["/entry/reference_process"]
@@ -98,41 +107,38 @@ def test_a_reference_in_a_scan_without_parameters_takes_its_load_but_no_film(tmp
     assert (found.load, found.film, found.indenter is not None) == (2.5, None, False)
 
 
-def test_an_artifact_comes_back(tmp_path):
-    write_artifact(make_artifact(), tmp_path / "a.h5")
-    found = load_apparatus(tmp_path / "a.h5")
+def test_an_artifact_comes_back():
+    found = kept()
     assert_same(found, make_artifact(), but=("source", "units"))
     assert found.parameters.units == ("V/Pa", "m", "m", "m", "V")
 
 
-def test_a_parameter_of_an_unknown_name_needs_a_unit_and_keeps_it(tmp_path):
+def test_a_parameter_of_an_unknown_name_needs_a_unit_and_keeps_it():
     values = np.array([2.0])
     covariance = np.eye(1)
-    unnamed = make_artifact(parameters=ParameterSet(("tilt",), values, covariance), budget={})
+    unnamed = ParameterSet(("tilt",), values, covariance)
     with pytest.raises(InputError, match=r"unit of tilt(.|\n)*units="):
-        write_artifact(unnamed, tmp_path / "a.h5")
-    assert not (tmp_path / "a.h5").exists()
+        kept(parameters=unnamed, budget={})
+    assert not Path("a.h5").exists()
     parameters = ParameterSet(("tilt",), values, covariance, units=("V/m",))
-    write_artifact(make_artifact(parameters=parameters, budget={}), tmp_path / "a.h5")
-    found = load_apparatus(tmp_path / "a.h5").parameters
+    found = kept(parameters=parameters, budget={}).parameters
     assert found.units == ("V/m",)
     assert found["tilt"] == 2.0
 
 
 @pytest.mark.parametrize("name", ["names", "Größe", "../x", "a/b", "a b", ""])
-def test_a_parameter_name_that_cannot_stand_in_a_file_is_refused(tmp_path, name):
+def test_a_parameter_name_that_cannot_stand_in_a_file_is_refused(name):
     parameters = ParameterSet((name,), np.ones(1), np.eye(1), units=("m",))
     with pytest.raises(InputError):
-        write_artifact(make_artifact(parameters=parameters, budget={}), tmp_path / "a.h5")
-    assert not (tmp_path / "a.h5").exists()
+        kept(parameters=parameters, budget={})
+    assert not Path("a.h5").exists()
 
 
-def test_check_names_are_kept_as_they_are_and_two_alike_are_refused(tmp_path):
+def test_check_names_are_kept_as_they_are_and_two_alike_are_refused():
     check = QualityCheck("Gaussian misfit (far)", 1.0, 2.0, True, "Fine.")
-    write_artifact(make_artifact(checks=(check,)), tmp_path / "a.h5")
-    assert load_apparatus(tmp_path / "a.h5").checks == (check,)
+    assert kept(checks=(check,)).checks == (check,)
     with pytest.raises(InputError, match="gaussian_misfit_far"):
-        write_artifact(make_artifact(checks=(check, check)), tmp_path / "b.h5")
+        kept(checks=(check, check))
 
 
 def test_the_texts_of_older_files_are_read_as_notes():
@@ -142,12 +148,10 @@ def test_the_texts_of_older_files_are_read_as_notes():
     assert texts == [("note", "7", "note"), ("note", "['z']", "note"), ("note", "", "note")]
 
 
-def test_configurations_with_numpy_numbers_and_infinities_are_stored_as_json(tmp_path):
+def test_configurations_with_numpy_numbers_and_infinities_are_stored_as_json():
     configuration = {"seed": np.int64(3), "mu": float("inf"), "loads": np.array([1.0, 2.0])}
-    data = make_artifact()
-    process = dataclasses.replace(data.process, configuration=configuration)
-    write_artifact(make_artifact(process=process), tmp_path / "a.h5")
-    found = load_apparatus(tmp_path / "a.h5").process.configuration
+    process = dataclasses.replace(make_artifact().process, configuration=configuration)
+    found = kept(process=process).process.configuration
     assert found == {"seed": 3, "mu": "inf", "loads": [1.0, 2.0]}
 
 
@@ -168,15 +172,15 @@ MESH = FieldMesh(
         (write_mesh, MESH),
     ],
 )
-def test_a_file_is_replaced_only_where_that_is_asked_for(tmp_path, write, thing):
-    path = tmp_path / "a.h5"
+def test_a_file_is_replaced_only_where_that_is_asked_for(write, thing):
+    path = Path("a.h5")
     path.write_bytes(b"years of work")
     with pytest.raises(OutputError, match="exists already"):
         write(thing, path)
     assert path.read_bytes() == b"years of work"
     write(thing, path, overwrite=True)
     assert b"years" not in path.read_bytes()
-    assert [file.name for file in tmp_path.iterdir()] == ["a.h5"]
+    assert [file.name for file in Path().iterdir()] == ["a.h5"]
 
 
 # Quantities are no smaller, in SI units.
@@ -191,19 +195,19 @@ finite = st.floats(-1e6, 1e6).map(lambda value: value if abs(value) > 1e-20 else
     notes=st.text(st.characters(categories=["L", "N", "P", "S"]), max_size=200),
     load=st.floats(1e-6, 1e6),
 )
-def test_any_scan_comes_back(tmp_path, x, missing, title, notes, load):
+def test_any_scan_comes_back(x, missing, title, notes, load):
     u = np.where(np.arange(x.size) < missing * x.size, np.nan, x)
     stated = {"x": x, "u_zz": u, "title": title, "notes": notes, "load": load}
     scan = make_scan(**(BARE | stated))
-    write_scan(scan, tmp_path / "scan.h5", overwrite=True)
-    found = read_scan(tmp_path / "scan.h5")
+    write_scan(scan, "scan.h5", overwrite=True)
+    found = read_scan("scan.h5")
     assert_same(found, scan, but=("source", "title"))
     assert found.title == "".join(c for c in title if c.isprintable() or c in "\n\t")
 
 
-def other_program(path: Path) -> None:
+def other_program() -> None:
     """Write a scan by the contract with h5py alone, in other units and other types."""
-    with h5py.File(path, "w") as file:
+    with h5py.File("scan.h5", "w") as file:
         file.attrs["memscal_schema"] = "memscal-scan"
         file.attrs["memscal_schema_version"] = "1.0.0"
         for name, value, units in (
@@ -220,9 +224,9 @@ def other_program(path: Path) -> None:
         file["entry/indenter/shape"] = "rod"
 
 
-def test_a_scan_of_another_program_is_read_in_its_own_units(tmp_path):
-    other_program(tmp_path / "scan.h5")
-    scan = read_scan(tmp_path / "scan.h5")
+def test_a_scan_of_another_program_is_read_in_its_own_units():
+    other_program()
+    scan = read_scan("scan.h5")
     assert scan.x.tolist() == [-1e-3, 0.0, 0.5e-3]
     np.testing.assert_allclose(scan.u_zz, [1e-6, 3e-6, 2e-6], rtol=1e-15)
     assert scan.load == pytest.approx(0.980665, rel=1e-12)
@@ -285,24 +289,22 @@ FILM = "/entry/sample/film"
         ("/entry/indenter/shape", "cone", "1", InputError, '.*/entry/indenter/shape is "cone"'),
     ],
 )
-def test_what_is_missing_or_wrong_is_named_by_file_and_path(
-    tmp_path, path, value, units, error, words
-):
-    other_program(tmp_path / "scan.h5")
-    with h5py.File(tmp_path / "scan.h5", "r+") as file:
+def test_what_is_missing_or_wrong_is_named_by_file_and_path(path, value, units, error, words):
+    other_program()
+    with h5py.File("scan.h5", "r+") as file:
         kept = file.pop(path)[()] if path in file else None
         if value is not None:
             file[path] = kept if value is ... else value
         if units is not None:
             file[path].attrs["units"] = units
     with pytest.raises(error, match=rf"scan\.h5{words}") as caught:
-        read_scan(tmp_path / "scan.h5")
+        read_scan("scan.h5")
     assert caught.value.cure or error is not UnitError
 
 
-def test_a_raster_with_its_axes_swapped_or_without_one_is_refused(tmp_path):
+def test_a_raster_with_its_axes_swapped_or_without_one_is_refused():
     for name, words in (("swapped", r"axes(.|\n)*Transpose"), ("one", "y as axis 0")):
-        path = tmp_path / f"{name}.h5"
+        path = Path(f"{name}.h5")
         write_scan(make_scan("raster"), path)
         with h5py.File(path, "r+") as file:
             del file.attrs["memscal_content_sha256"]

@@ -38,6 +38,11 @@ def log(seed: int, correlation: float = 0.0, *, creep: float = 0.0) -> dict[str,
     return {"x": x + rng.normal(size=x.size) * 1e-6, "normal_load": load, "u_zz": u + 2e-6 * noise}
 
 
+def found(columns: dict[str, Any], depth: Any = None, **options: Any) -> Holds:
+    columns = {name: values for name, values in columns.items() if name != "depth"}
+    return find_holds(columns, np.arange(columns["x"].size), VOLTS, depth=depth, **options)
+
+
 @pytest.mark.parametrize("correlation", [0.0, 0.6])
 @pytest.mark.parametrize("loads", [True, False], ids=["load", "no load"])
 def test_the_means_of_holds_scatter_by_their_uncertainty(correlation, loads):
@@ -47,7 +52,7 @@ def test_the_means_of_holds_scatter_by_their_uncertainty(correlation, loads):
         columns = log(seed, correlation)
         if not loads:
             del columns["normal_load"]
-        holds = find_holds(columns, np.arange(columns["x"].size), VOLTS)
+        holds = found(columns)
         assert holds.first.size == PLACES.size
         np.testing.assert_allclose(holds.mean["x"], PLACES, atol=2e-6)
         errors.append((holds.mean["u_zz"] - SIGNAL) / holds.u_errors)
@@ -57,7 +62,7 @@ def test_the_means_of_holds_scatter_by_their_uncertainty(correlation, loads):
 
 def test_creep_within_holds_is_told():
     columns = log(1, creep=0.2)
-    holds = find_holds(columns, np.arange(columns["x"].size), VOLTS)
+    holds = found(columns)
     assert float(holds.notes[2].split("at most by ")[1].split()[0]) > 0.05
 
 
@@ -65,11 +70,11 @@ def test_what_is_no_log_is_refused_and_a_short_press_is_left_out():
     columns = log(2)
     first = int(np.argmax(columns["normal_load"] > 0.9))
     columns["normal_load"][first + 3 :][columns["x"][first + 3 :] < -7.8e-3] = 0.0
-    holds = find_holds(columns, np.arange(columns["x"].size), VOLTS)
+    holds = found(columns)
     assert holds.first.size == PLACES.size - 1
     assert "1 presses of fewer than 5 steady rows are left out" in holds.notes[0]
     with pytest.raises(InputError, match="The log has no hold"):
-        find_holds({n: v[::40] for n, v in columns.items()}, np.arange(99)[:48], VOLTS)
+        found({n: v[::40] for n, v in columns.items()})
 
 
 def presses(sensor: float, waits: dict[int, int], drift: float = 0.0) -> dict[str, Any]:
@@ -86,11 +91,6 @@ def presses(sensor: float, waits: dict[int, int], drift: float = 0.0) -> dict[st
     steps = drift * np.floor((columns["x"] + 6e-3) / 1e-3)
     columns["u_zz"] = signal * (columns["depth"] > 0) + noise + steps
     return columns
-
-
-def found(columns: dict[str, Any], depth: Any = None, **options: Any) -> Holds:
-    columns = {"x": columns["x"], "u_zz": columns["u_zz"]}
-    return find_holds(columns, np.arange(columns["x"].size), VOLTS, depth=depth, **options)
 
 
 WAITS = [{}, {0: 500}, {6: 500}, {0: 60, 9: 90}]

@@ -23,6 +23,7 @@ from memscal.errors import FormatError, InputError, MemscalError, UnsafeFileErro
 from memscal.extensions.meshes import mesh_files
 from memscal.extensions.meshes.mesh_files import Mesh, read_mesh
 
+pytestmark = pytest.mark.usefixtures("folder")
 AT_ONCE = pytest.mark.usefixtures("at_once")
 SMALL = section(radii=np.linspace(0.0, 8.0, 5), heights=np.array([0.0, 1.0]))
 BOMB = "".join(
@@ -37,10 +38,10 @@ POINTS = (
 )
 
 
-def small(path: Path, **options: Any) -> Path:
+def small(name: str, **options: Any) -> Path:
     """Save a small mesh with one stress."""
     mesh = meshio.Mesh(SMALL.points, SMALL.cells, point_data={"S9": SMALL.point_data["S9"]})
-    return write(mesh, path, **options)
+    return write(mesh, Path(name), **options)
 
 
 def edited(path: Path, old: str, new: str) -> Path:
@@ -75,10 +76,10 @@ def refused(path: Path, words="cannot be read", kind: type[MemscalError] = Forma
         ("film.vtu", '<!DOCTYPE a SYSTEM "{}">'),
     ],
 )
-def test_entities_neither_grow_nor_open_a_file(tmp_path, name, document_type):
-    (tmp_path / "other").write_text('<!ENTITY e11 "a secret">')
-    path = tmp_path / name
-    head = document_type.replace("{}", (tmp_path / "other").as_uri())
+def test_entities_neither_grow_nor_open_a_file(folder, name, document_type):
+    (folder / "other").write_text('<!ENTITY e11 "a secret">')
+    path = folder / name
+    head = document_type.replace("{}", (folder / "other").as_uri())
     root = {"film.vtu": "VTKFile", "film.xdmf": "Xdmf"}[name]
     path.write_text(f'<?xml version="1.0"?>{head}<{root} type="&e11;">&e11;</{root}>')
     assert "secret" not in refused(path)
@@ -86,27 +87,27 @@ def test_entities_neither_grow_nor_open_a_file(tmp_path, name, document_type):
 
 @pytest.mark.parametrize("text", ["<a>" * 10**5, f"<VTKFile>{'<b/>' * 10**5}</VTKFile>"])
 @AT_ONCE
-def test_absurd_xml_is_refused(tmp_path, text):
-    path = tmp_path / "film.vtu"
+def test_absurd_xml_is_refused(text):
+    path = Path("film.vtu")
     path.write_text(text)
     refused(path)
 
 
-def test_compressed_blocks_of_gigabytes_meet_the_limits_and_leave_nothing(tmp_path, monkeypatch):
+def test_compressed_blocks_of_gigabytes_meet_the_limits_and_leave_nothing(folder, monkeypatch):
     """Eighty blocks of 16 MiB."""
-    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    monkeypatch.setattr(tempfile, "tempdir", str(folder))
     block = zlib.compress(bytes(2**24), 9)
     header = struct.pack("<83I", 80, 2**24, 0, *[len(block)] * 80)
-    path = tmp_path / "film.vtu"
+    path = folder / "film.vtu"
     blocks = base64.b64encode(header) + base64.b64encode(block * 80)
     path.write_text(POINTS.format(blocks.decode()))
     refused(path, r"more than 6\d\d MB", UnsafeFileError)
-    assert list(tmp_path.iterdir()) == [path]
+    assert list(folder.iterdir()) == [path]
 
 
 @AT_ONCE
-def test_what_a_reader_answers_is_bounded_by_the_size_of_the_mesh(tmp_path, monkeypatch):
-    path = small(tmp_path / "film.vtu")
+def test_what_a_reader_answers_is_bounded_by_the_size_of_the_mesh(monkeypatch):
+    path = small("film.vtu")
     monkeypatch.setattr(mesh_files, "_ANSWER", 0)
     size = path.stat().st_size
     values = sum(a.nbytes for a in (SMALL.points, SMALL.cells[0].data, SMALL.point_data["S9"]))
@@ -119,7 +120,7 @@ def test_what_a_reader_answers_is_bounded_by_the_size_of_the_mesh(tmp_path, monk
 def test_a_reader_that_is_killed_leaves_nothing_and_a_full_folder_is_no_damage(
     tmp_path, monkeypatch
 ):
-    path = small(tmp_path / "film.vtk")
+    path = small("film.vtk")
     folder = tmp_path / "temporary"
     folder.mkdir()
     monkeypatch.setattr(tempfile, "tempdir", str(folder))
@@ -151,16 +152,16 @@ def test_a_reader_that_is_killed_leaves_nothing_and_a_full_folder_is_no_damage(
     ],
 )
 @AT_ONCE
-def test_a_count_beyond_the_files_size_is_refused(tmp_path, section_name, options):
-    path = small(tmp_path / "film.vtk", **options)
+def test_a_count_beyond_the_files_size_is_refused(section_name, options):
+    path = small("film.vtk", **options)
     head, name, rest = path.read_bytes().partition(section_name.encode() + b" ")
     rest = re.sub(rb"^\d+", b"900000000000", rest)
     path.write_bytes(head + name + rest)
     refused(path)
 
 
-def test_a_few_bytes_that_stand_for_a_billion_points_are_refused(tmp_path):
-    path = tmp_path / "film.vtk"
+def test_a_few_bytes_that_stand_for_a_billion_points_are_refused():
+    path = Path("film.vtk")
     path.write_text(
         "# vtk DataFile Version 3.0\na title\nASCII\nDATASET STRUCTURED_POINTS\n"
         "DIMENSIONS 2000 2000 2000\nORIGIN 0 0 0\nSPACING 1 1 1\nPOINT_DATA 8000000000\n"
@@ -170,19 +171,19 @@ def test_a_few_bytes_that_stand_for_a_billion_points_are_refused(tmp_path):
 
 @pytest.mark.parametrize("kind", ["polygon", "VTK_LAGRANGE_TRIANGLE"])
 @AT_ONCE
-def test_cells_that_state_their_own_size_are_read(tmp_path, kind):
+def test_cells_that_state_their_own_size_are_read(kind):
     mesh = meshio.Mesh(SMALL.points, [(kind, SMALL.cells[0].data[:, :3])])
-    meshio.vtk.write(tmp_path / "film.vtk", mesh)
-    meshio.vtu.write(tmp_path / "film.vtu", mesh)
+    meshio.vtk.write("film.vtk", mesh)
+    meshio.vtu.write("film.vtu", mesh)
     for name in ("film.vtk", "film.vtu"):
-        (cells,) = read_mesh(tmp_path / name).solid
+        (cells,) = read_mesh(name).solid
         np.testing.assert_array_equal(cells.nodes, SMALL.cells[0].data[:, :3])
 
 
 @pytest.mark.parametrize("offsets", ["3000000000 4", "-4 4", "0 4", "4 9", "4.0 8.0"])
 @AT_ONCE
-def test_a_cell_with_billions_of_nodes_is_refused(tmp_path, offsets):
-    path = tmp_path / "film.vtu"
+def test_a_cell_with_billions_of_nodes_is_refused(offsets):
+    path = Path("film.vtu")
     mesh = meshio.Mesh(SMALL.points, [("polygon", SMALL.cells[0].data[:2])])
     meshio.vtu.write(path, mesh, binary=False)
     edited(path, numbers_of(path, "offsets"), offsets)
@@ -203,15 +204,15 @@ def test_a_cell_with_billions_of_nodes_is_refused(tmp_path, offsets):
     ],
 )
 @AT_ONCE
-def test_an_xdmf_file_reaches_no_file_but_the_one_of_its_name(tmp_path, address):
-    path = edited(small(tmp_path / "film.xdmf"), "film.h5:/data1", address)
-    with h5py.File(tmp_path / "film.h5", "r") as file, h5py.File(tmp_path / "other.h5", "w") as to:
+def test_an_xdmf_file_reaches_no_file_but_the_one_of_its_name(address):
+    path = edited(small("film.xdmf"), "film.h5:/data1", address)
+    with h5py.File("film.h5", "r") as file, h5py.File("other.h5", "w") as to:
         file.copy("data1", to)
     refused(path, "takes its numbers from", UnsafeFileError)
 
 
-def test_an_xdmf_file_with_raw_binary_numbers_is_refused(tmp_path):
-    path = small(tmp_path / "film.xdmf", data_format="XML")
+def test_an_xdmf_file_with_raw_binary_numbers_is_refused():
+    path = small("film.xdmf", data_format="XML")
     head, _, rest = path.read_text().partition('Format="XML"')
     rest = rest.partition("</DataItem>")[2]
     path.write_text(f'{head}Format="Binary">/etc/passwd</DataItem>{rest}')
@@ -219,18 +220,18 @@ def test_an_xdmf_file_with_raw_binary_numbers_is_refused(tmp_path):
 
 
 @AT_ONCE
-def test_the_hdf5_file_of_an_xdmf_file_is_a_source_and_read_safely(tmp_path):
-    path = small(tmp_path / "film.xdmf")
+def test_the_hdf5_file_of_an_xdmf_file_is_a_source_and_read_safely():
+    path = small("film.xdmf")
     mesh = read_mesh(path)
     assert [source.file_name for source in mesh.sources] == ["film.xdmf", "film.h5"]
     assert any(f"film.h5 (sha256 {mesh.sources[1].sha256})" in note for note in mesh.notes)
-    with h5py.File(tmp_path / "film.h5", "r+") as file:
+    with h5py.File("film.h5", "r+") as file:
         del file["data1"]
         file["data1"] = h5py.ExternalLink("/etc/passwd", "/x")
     with pytest.raises(UnsafeFileError, match=r"film\.h5: /data1 is reached through"):
         read_mesh(path)
-    (tmp_path / "film.h5").unlink()
-    os.mkfifo(tmp_path / "film.h5")
+    Path("film.h5").unlink()
+    os.mkfifo("film.h5")
     with pytest.raises(UnsafeFileError, match=r"film\.h5 is not a regular file"):
         read_mesh(path)
 
@@ -268,15 +269,15 @@ XDMF_EDITS = [
     ],
 )
 @AT_ONCE
-def test_a_file_of_another_shape_than_a_mesh_with_numbers_is_refused(tmp_path, name, edit):
+def test_a_file_of_another_shape_than_a_mesh_with_numbers_is_refused(name, edit):
     old, new, words = edit
     options = {"data_format": "XML"} if name == "film.xdmf" else {}
-    refused(edited(small(tmp_path / name, **options), old, new), words)
+    refused(edited(small(name, **options), old, new), words)
 
 
 @AT_ONCE
-def test_a_series_of_xdmf_is_refused_and_a_document_type_as_fenics_writes_it_is_not(tmp_path):
-    path = small(tmp_path / "film.xdmf")
+def test_a_series_of_xdmf_is_refused_and_a_document_type_as_fenics_writes_it_is_not():
+    path = small("film.xdmf")
     edited(path, "<Xdmf ", '<!DOCTYPE Xdmf SYSTEM "Xdmf.dtd" []><Xdmf ')
     assert read_mesh(path).point_data["S9"].shape == (10, 9)
     edited(path, "<Topology", '<Time Value="0" /><Topology')
@@ -287,16 +288,16 @@ def test_a_series_of_xdmf_is_refused_and_a_document_type_as_fenics_writes_it_is_
 
 
 @AT_ONCE
-def test_entities_in_the_text_of_xml_do_not_grow(tmp_path):
+def test_entities_in_the_text_of_xml_do_not_grow():
     """meshio parses the text of an element again, as XML."""
-    path = small(tmp_path / "film.xdmf")
+    path = small("film.xdmf")
     bomb = f"<Information><![CDATA[<!DOCTYPE a [{BOMB}]><a>&e11;</a>]]></Information>"
     refused(edited(path, "<Topology", f"{bomb}<Topology"), "declares entities", UnsafeFileError)
 
 
 @AT_ONCE
-def test_polyhedra_and_fields_of_the_wrong_length_are_refused(tmp_path):
-    path = small(tmp_path / "film.vtu", binary=False)
+def test_polyhedra_and_fields_of_the_wrong_length_are_refused():
+    path = small("film.vtu", binary=False)
     text = path.read_text()
     types = numbers_of(path, "types")
     path.write_text(text.replace(types, types.replace("9", "42", 1)))
@@ -308,8 +309,8 @@ def test_polyhedra_and_fields_of_the_wrong_length_are_refused(tmp_path):
 
 @pytest.mark.parametrize(("name", "before"), [("film.vtu", 'Name="S9"'), ("film.vtk", "POINTS")])
 @AT_ONCE
-def test_words_among_numbers_are_refused_and_not_cut_short(tmp_path, name, before):
-    path = small(tmp_path / name, binary=False)
+def test_words_among_numbers_are_refused_and_not_cut_short(name, before):
+    path = small(name, binary=False)
     head, mark, rest = path.read_text().partition(before)
     ended = "\n" if name == "film.vtk" else ">"
     line, _, numbers = rest.partition(ended)
@@ -318,8 +319,8 @@ def test_words_among_numbers_are_refused_and_not_cut_short(tmp_path, name, befor
 
 
 @AT_ONCE
-def test_nodes_that_are_not_there_or_nowhere_are_refused(tmp_path):
-    path = tmp_path / "film.vtu"
+def test_nodes_that_are_not_there_or_nowhere_are_refused():
+    path = Path("film.vtu")
     meshio.vtu.write(path, meshio.Mesh(SMALL.points, [("quad", SMALL.cells[0].data + 100)]))
     refused(path, "a node that is not there")
     points = SMALL.points.copy()
@@ -329,16 +330,16 @@ def test_nodes_that_are_not_there_or_nowhere_are_refused(tmp_path):
 
 
 @AT_ONCE
-def test_text_from_a_mesh_cannot_steer_the_terminal(tmp_path):
+def test_text_from_a_mesh_cannot_steer_the_terminal():
     mesh = meshio.Mesh(SMALL.points, SMALL.cells, point_data={"S\x9b[2J": np.zeros(10)})
-    meshio.vtu.write(tmp_path / "film.vtu", mesh)
-    assert list(read_mesh(tmp_path / "film.vtu").point_data) == ["S[2J"]
+    meshio.vtu.write("film.vtu", mesh)
+    assert list(read_mesh("film.vtu").point_data) == ["S[2J"]
 
 
 @pytest.mark.parametrize("ending", [".vtu", ".vtk", ".xdmf"])
 @AT_ONCE
-def test_what_is_no_file_with_something_in_it_is_refused(tmp_path, ending):
-    path = tmp_path / f"film{ending}"
+def test_what_is_no_file_with_something_in_it_is_refused(ending):
+    path = Path(f"film{ending}")
     with pytest.raises(InputError, match="No such file"):
         read_mesh(path)
     path.write_bytes(b"")
@@ -352,9 +353,9 @@ def test_what_is_no_file_with_something_in_it_is_refused(tmp_path, ending):
 
 
 @AT_ONCE
-def test_meshio_does_not_print_to_the_terminal(tmp_path, capfd):
+def test_meshio_does_not_print_to_the_terminal(capfd):
     """It warns on the terminal of a cell that it does not know; here this is a note."""
-    path = small(tmp_path / "film.vtu", binary=False)
+    path = small("film.vtu", binary=False)
     types = numbers_of(path, "types")
     edited(path, types, types.replace("9", "4", 1))
     capfd.readouterr()  # meshio warned of writing text, too
@@ -384,7 +385,7 @@ def hostile(tmp_path, monkeypatch) -> Callable[[str], Path]:
         folder.mkdir(parents=True)
         folder.joinpath("__init__.py").write_text(HOSTILE.format(code.replace("\n", "\n    ")))
         monkeypatch.syspath_prepend(folder.parent)
-        return small(tmp_path / "film.vtk")
+        return small("film.vtk")
 
     return with_reader
 
@@ -440,12 +441,12 @@ def test_an_endless_reader_ends(hostile, monkeypatch):
 
 @pytest.mark.parametrize("name", ["film.vtu", "film.vtk", "film.xdmf", "vtk_film.vtu"])
 @AT_ONCE
-def test_damage_is_refused_or_harmless_wherever_it_is(tmp_path, name):
-    path = tmp_path / name
+def test_damage_is_refused_or_harmless_wherever_it_is(name):
+    path = Path(name)
     if name == "vtk_film.vtu":
         path.write_bytes((Path(__file__).parents[2] / "data" / name).read_bytes())
     else:
-        small(path)
+        small(name)
     good = path.read_bytes()
     for i in np.linspace(20, len(good) - 20, 2).astype(int):
         path.write_bytes(good[:i])
