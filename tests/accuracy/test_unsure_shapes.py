@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from helpers import outside
 from helpers.bounds import FULL
 from helpers.outside import Part, World
 from scipy.stats import chi2
@@ -43,12 +44,9 @@ def halves(scan: Scan) -> list[Scan]:
 
 
 def few_places(kind: str, seed: int) -> Scan:
-    u = World(load=1.0, radius=0.5e-3, thickness=2.5e-3, parts=SENSORS[kind]).voltages(PLACES)
-    noise = np.full(u.size, 0.002 * u.max())
-    u = u + noise * np.random.default_rng(seed).standard_normal(u.size)
-    return Scan(
-        x=PLACES, u_zz=u, u_zz_errors=noise, load=1.0, indenter=Rod(radius=0.5e-3), film=FILM
-    )
+    world = World(load=1.0, radius=0.5e-3, thickness=2.5e-3, parts=SENSORS[kind])
+    made = outside.scan(world, seed, noise=0.002, x=PLACES)
+    return replace(made, load_uncertainty=None, indenter=Rod(radius=0.5e-3), film=FILM)
 
 
 def flat_top(seed: int, decay: float) -> tuple[Scan, float]:

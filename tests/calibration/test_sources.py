@@ -5,6 +5,7 @@ chi-square probability, of a slit a difference of normal ones, of a Gaussian a w
 """
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,6 +18,8 @@ from scipy.stats import chi2, norm
 
 import memscal
 from memscal.errors import FitError, InputError, MemscalError
+
+pytestmark = pytest.mark.usefixtures("folder")
 
 A = 2.0
 SIGMA = 0.3e-3
@@ -139,11 +142,11 @@ def test_a_field_that_is_not_round_is_seen_by_a_round_sensor(raster, method):
 
 
 @pytest.mark.parametrize("form", [memscal.IdealReference("slit", SIZE), field()])
-def test_the_artifact_keeps_the_reference(tmp_path, form):
+def test_the_artifact_keeps_the_reference(form):
     kind = "ellipse" if isinstance(form, memscal.StressField) else "slit"
     a = memscal.calibrate(scanned(kind, seed=2), reference=form, method="bayesian").apparatus
-    a.save(tmp_path / "a.h5")
-    kept = memscal.load_apparatus(tmp_path / "a.h5").reference
+    a.save("a.h5")
+    kept = memscal.load_apparatus("a.h5").reference
     if kind == "slit":
         assert kept.ideal == form
     else:
@@ -152,15 +155,15 @@ def test_the_artifact_keeps_the_reference(tmp_path, form):
         assert kept.field.unit == "uT"
 
 
-def test_fields_are_read_from_arrays_and_images(tmp_path):
+def test_fields_are_read_from_arrays_and_images():
     values = field().values / field().values.max()
-    np.save(tmp_path / "f.npy", values)
+    np.save("f.npy", values)
     grey = (255 * values).astype(np.uint8)
-    Image.fromarray((65535 * values).astype(np.uint16)).save(tmp_path / "f.png")
-    Image.fromarray(values.astype(np.float32)).save(tmp_path / "f.tif")
-    Image.fromarray(np.stack([grey, grey, grey, 255 + 0 * grey], axis=-1)).save(tmp_path / "c.png")
+    Image.fromarray((65535 * values).astype(np.uint16)).save("f.png")
+    Image.fromarray(values.astype(np.float32)).save("f.tif")
+    Image.fromarray(np.stack([grey, grey, grey, 255 + 0 * grey], axis=-1)).save("c.png")
     for name, scale in (("f.npy", 1), ("f.png", 65535), ("f.tif", 1), ("c.png", 255)):
-        kept = memscal.read_reference(tmp_path / name, pixel_size=PIXEL).field
+        kept = memscal.read_reference(name, pixel_size=PIXEL).field
         np.testing.assert_allclose(kept.values / scale, values, atol=1 / 255)
         assert np.ptp(kept.x) == pytest.approx(80 * PIXEL)
         assert ("luminance" in kept.notes) == (name == "c.png")
@@ -179,13 +182,13 @@ BAD = {
 
 
 @pytest.mark.parametrize("name", [*BAD, "cut.npy", "cut.png", "no.npy"])
-def test_what_is_no_field_is_refused(tmp_path, name):
+def test_what_is_no_field_is_refused(name):
     if name in BAD:
-        np.save(tmp_path / name, BAD[name], allow_pickle=True)
+        np.save(name, BAD[name], allow_pickle=True)
     elif name != "no.npy":
-        (tmp_path / name).write_bytes(b"\x93NUMPY" if name.endswith("npy") else b"\x89PNG\r\n")
+        Path(name).write_bytes(b"\x93NUMPY" if name.endswith("npy") else b"\x89PNG\r\n")
     with pytest.raises(MemscalError):
-        memscal.read_reference(tmp_path / name, pixel_size=PIXEL)
+        memscal.read_reference(name, pixel_size=PIXEL)
 
 
 @pytest.mark.parametrize(

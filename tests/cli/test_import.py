@@ -1,6 +1,7 @@
 """``memscal import``."""
 
 import numpy as np
+import pytest
 
 import memscal
 
@@ -10,28 +11,34 @@ OPTIONS = (
 )
 
 
-def test_a_log_of_presses_is_averaged_and_drawn(run, folder):
+def write_log(last: str, level: float = 0.0) -> None:
+    """Write 17 presses of 20 rows, over a sensor that is a Gaussian of 1 mm."""
     x = np.repeat(np.linspace(-8, 8, 17), 20)
-    load = np.tile(np.repeat([0.0, 1.0], 10), 17)
+    pressed = np.tile(np.repeat([0.0, 1.0], 10), 17)
     noise = np.random.default_rng(1).normal(size=(2, x.size)) * 1e-3
-    rows = np.stack([x, load * np.exp(-(x**2)) + noise[0], load + noise[1]], axis=1)
-    np.savetxt("log.csv", rows, delimiter=",", header="x/mm,u/mV,F [N]", comments="")
+    rows = np.stack([x, level + pressed * np.exp(-(x**2)) + noise[0], pressed + noise[1]], axis=1)
+    np.savetxt("log.csv", rows, delimiter=",", header=f"x/mm,u/mV,{last}", comments="")
+
+
+def gaussian() -> memscal.Scan:
+    """Return what was imported, which is that sensor's."""
+    scan = memscal.read_scan("scan.h5")
+    np.testing.assert_allclose(scan.u_zz, 1e-3 * np.exp(-(scan.x**2) * 1e6), atol=2e-6)
+    return scan
+
+
+def test_a_log_of_presses_is_averaged_and_drawn(run, folder):
+    write_log("F [N]")
     told = run("import", "log.csv", "-o", "scan.h5", *OPTIONS.split()).exits(0).out
     assert "17 holds of 10 to 10 rows, the first in lines 12 to 21" in told
     assert (folder / "log.png").read_bytes().startswith(b"\x89PNG")
-    scan = memscal.read_scan("scan.h5")
-    np.testing.assert_allclose(scan.u_zz, 1e-3 * np.exp(-(scan.x**2) * 1e6), atol=2e-6)
+    gaussian()
 
 
-def test_a_depth_tells_the_presses_and_is_not_kept(run, folder):
-    x = np.repeat(np.linspace(-8, 8, 17), 20)
-    down = np.tile(np.repeat([0.0, 1.0], 10), 17)
-    noise = np.random.default_rng(1).normal(size=x.size) * 1e-3
-    rows = np.stack([x, 0.3 + down * np.exp(-(x**2)) + noise, down], axis=1)
-    np.savetxt("log.csv", rows, delimiter=",", header="x/mm,u/mV,z", comments="")
-    told = "import log.csv -o s.h5 --x x --u u --depth z --depth-unit mm --baseline before-each"
+@pytest.mark.usefixtures("folder")
+def test_a_depth_tells_the_presses_and_is_not_kept(run):
+    write_log("z", level=0.3)
+    told = "import log.csv -o scan.h5 --x x --u u --depth z --depth-unit mm --baseline before-each"
     run(*told.split()).exits(2)
     run(*told.split(), "--holds").exits(0)
-    scan = memscal.read_scan(folder / "s.h5")
-    assert scan.normal_load is None
-    np.testing.assert_allclose(scan.u_zz, 1e-3 * np.exp(-(scan.x**2) * 1e6), atol=2e-6)
+    assert gaussian().normal_load is None

@@ -15,12 +15,14 @@ from memscal.errors import OutputError
 from memscal.formats import files
 from memscal.formats.files import atomic_write_bytes, ensure_writable, together
 
+pytestmark = pytest.mark.usefixtures("folder")
+
 OLD = b"the old output"
 
 
 @pytest.fixture
-def target(tmp_path: Path) -> Path:
-    path = tmp_path / "out.h5"
+def target(folder: Path) -> Path:
+    path = folder / "out.h5"
     path.write_bytes(OLD)
     return path
 
@@ -54,12 +56,12 @@ def assert_untouched(target: Path) -> None:
 
 
 @pytest.mark.parametrize("hard_links", [True, False])
-def test_a_new_file_holds_the_bytes_and_nothing_else_is_left(tmp_path, monkeypatch, hard_links):
+def test_a_new_file_holds_the_bytes_and_nothing_else_is_left(monkeypatch, hard_links):
     if not hard_links:
         monkeypatch.setattr(os, "link", fail_with(errno.EPERM))
-    atomic_write_bytes(tmp_path / "new.bin", b"abc")
-    assert (tmp_path / "new.bin").read_bytes() == b"abc"
-    assert os.listdir(tmp_path) == ["new.bin"]
+    atomic_write_bytes("new.bin", b"abc")
+    assert Path("new.bin").read_bytes() == b"abc"
+    assert os.listdir() == ["new.bin"]
 
 
 @pytest.mark.parametrize("call", ["write", "fsync", "open"])
@@ -83,13 +85,13 @@ def test_a_disk_that_refuses_leaves_the_old_output_and_says_what_to_do(
     assert_untouched(target)
 
 
-def test_short_writes_are_continued(tmp_path, monkeypatch):
+def test_short_writes_are_continued(monkeypatch):
     write = os.write
     data = bytes(range(256)) * 10
     with monkeypatch.context() as patch:
         patch.setattr(os, "write", lambda descriptor, part: write(descriptor, bytes(part)[:100]))
-        atomic_write_bytes(tmp_path / "a", data)
-    assert (tmp_path / "a").read_bytes() == data
+        atomic_write_bytes("a", data)
+    assert Path("a").read_bytes() == data
 
 
 def test_an_interrupt_leaves_no_temporary_file(target, monkeypatch):
@@ -103,8 +105,8 @@ def test_an_interrupt_leaves_no_temporary_file(target, monkeypatch):
     assert_untouched(target)
 
 
-def test_a_file_that_appears_late_is_not_replaced(tmp_path, monkeypatch):
-    target = tmp_path / "out.h5"
+def test_a_file_that_appears_late_is_not_replaced(monkeypatch):
+    target = Path("out.h5")
     fsync = os.fsync
 
     def appear(descriptor: int) -> None:
@@ -118,13 +120,13 @@ def test_a_file_that_appears_late_is_not_replaced(tmp_path, monkeypatch):
     assert_untouched(target)
 
 
-def test_the_permissions_are_those_of_the_umask(tmp_path):
+def test_the_permissions_are_those_of_the_umask():
     before = os.umask(0o027)
     try:
-        atomic_write_bytes(tmp_path / "a", b"")
+        atomic_write_bytes("a", b"")
     finally:
         os.umask(before)
-    assert stat.S_IMODE((tmp_path / "a").stat().st_mode) == 0o640
+    assert stat.S_IMODE(Path("a").stat().st_mode) == 0o640
 
 
 def test_a_symbolic_link_is_followed_and_stays(target):
@@ -135,10 +137,10 @@ def test_a_symbolic_link_is_followed_and_stays(target):
     assert target.read_bytes() == b"new"
 
 
-def test_a_folder_a_pipe_and_a_device_are_refused_as_outputs(tmp_path):
-    os.mkfifo(tmp_path / "pipe")
-    assert_refused(tmp_path, "is a folder")
-    for path in (tmp_path / "pipe", os.devnull):
+def test_a_folder_a_pipe_and_a_device_are_refused_as_outputs():
+    os.mkfifo("pipe")
+    assert_refused(".", "is a folder")
+    for path in ("pipe", os.devnull):
         assert_refused(path, "not a regular file")
 
 
@@ -151,9 +153,9 @@ def test_a_folder_a_pipe_and_a_device_are_refused_as_outputs(tmp_path):
         ("", "not the name"),
     ],
 )
-def test_a_path_that_cannot_exist_is_refused_with_its_cure(tmp_path, name, words):
-    (tmp_path / "file").write_bytes(b"")
-    assert_refused(str(tmp_path / name) if name else "", words)
+def test_a_path_that_cannot_exist_is_refused_with_its_cure(name, words):
+    Path("file").write_bytes(b"")
+    assert_refused(name, words)
 
 
 def test_a_folder_in_which_nothing_can_be_made_is_refused_before_the_work():
@@ -162,9 +164,9 @@ def test_a_folder_in_which_nothing_can_be_made_is_refused_before_the_work():
     assert caught.value.exit_code == 4
 
 
-def three(tmp_path: Path) -> list[Path]:
+def three() -> list[Path]:
     """Two old outputs and a new one."""
-    paths = [tmp_path / name for name in ("a", "b", "c")]
+    paths = [Path(name) for name in ("a", "b", "c")]
     for path in paths[:2]:
         path.write_bytes(OLD)
     return paths
@@ -183,10 +185,10 @@ def write_together(paths: list[Path], stop: BaseException | None = None) -> None
 @pytest.mark.parametrize("hard_links", [True, False])
 @pytest.mark.parametrize("failing", ["a", "b", "c"])
 def test_files_that_are_written_together_are_all_new_or_all_as_before(
-    tmp_path, monkeypatch, hard_links, failing
+    monkeypatch, hard_links, failing
 ):
     """Every rename in turn fails; without hard links the message says which file is new."""
-    paths = three(tmp_path)
+    paths = three()
     rename = os.replace
 
     def replace(source: Path, target: Path) -> None:
@@ -204,7 +206,7 @@ def test_files_that_are_written_together_are_all_new_or_all_as_before(
     assert new == ([] if hard_links else ["a", "b", "c"][: "abc".index(failing)])
     stated = re.search(r"New is now: (.+?)\. As before is: ", caught.value.why)
     assert [Path(name).name for name in stated[1].split(", ")][::-1] == new if new else not stated
-    assert sorted(os.listdir(tmp_path)) == ["a", "b"]
+    assert sorted(os.listdir()) == ["a", "b"]
 
 
 @pytest.mark.parametrize("mode", [0o600, 0o640, 0o444, 0o755])
@@ -222,23 +224,23 @@ atomic_write_bytes(sys.argv[1], b"new")
 """
 
 
-def test_a_later_run_removes_what_a_killed_process_left_and_nothing_of_a_living_one(tmp_path):
+def test_a_later_run_removes_what_a_killed_process_left_and_nothing_of_a_living_one():
     """However old it is, a file whose process lives stays; so does what is no file of ours."""
-    command = [sys.executable, "-c", KILLED, str(tmp_path / "out")]
+    command = [sys.executable, "-c", KILLED, "out"]
     with subprocess.Popen(command, stdout=subprocess.PIPE) as process:
         assert process.stdout.readline()
-        (left,) = tmp_path.iterdir()
-        (tmp_path / ".memscal-mine.tmp").write_bytes(OLD)
-        for path in tmp_path.iterdir():
+        (left,) = Path().iterdir()
+        Path(".memscal-mine.tmp").write_bytes(OLD)
+        for path in Path().iterdir():
             os.utime(path, (0, 0))
-        atomic_write_bytes(tmp_path / "a", b"")
+        atomic_write_bytes("a", b"")
         assert left.exists()
         process.kill()
     files._remove_orphans.cache_clear()
     os.utime(left)  # just now: another process may not have come to its lock
-    atomic_write_bytes(tmp_path / "b", b"")
+    atomic_write_bytes("b", b"")
     assert left.exists()
     files._remove_orphans.cache_clear()
     os.utime(left, (0, 0))
-    ensure_writable(tmp_path / "c")
-    assert sorted(os.listdir(tmp_path)) == [".memscal-mine.tmp", "a", "b"]
+    ensure_writable("c")
+    assert sorted(os.listdir()) == [".memscal-mine.tmp", "a", "b"]

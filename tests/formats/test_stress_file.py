@@ -23,6 +23,8 @@ from memscal.model.instrument import Equipment
 from memscal.model.provenance import Process, SourceFile
 from memscal.model.scan import LoadCell, StressSensor
 
+pytestmark = pytest.mark.usefixtures("folder")
+
 DATA = Path(__file__).parents[1] / "data"
 
 SCANS = tuple(
@@ -108,15 +110,15 @@ def make_stress(**fields: Any) -> MeasuredStress:
 
 
 @pytest.fixture
-def path(tmp_path: Path) -> Path:
-    write_stress(make_stress(), tmp_path / "a.stress.h5")
-    return tmp_path / "a.stress.h5"
+def path(folder: Path) -> Path:
+    write_stress(make_stress(), "a.stress.h5")
+    return folder / "a.stress.h5"
 
 
 @pytest.fixture
-def old(tmp_path: Path) -> Path:
+def old(folder: Path) -> Path:
     """A file of version 1.0."""
-    path = tmp_path / "old.stress.h5"
+    path = folder / "old.stress.h5"
     path.write_bytes(gzip.decompress((DATA / "stress_1_0.h5.gz").read_bytes()))
     return path
 
@@ -128,7 +130,7 @@ def test_what_was_saved_and_read_again_is_equal_to_the_last_bit(path):
     assert len(repr(found)) < 200
 
 
-def test_a_file_of_version_1_0_is_read_with_what_it_holds(old, tmp_path):
+def test_a_file_of_version_1_0_is_read_with_what_it_holds(old):
     found = memscal.read_stress(old)
     [profile] = found.profiles
     assert (profile.load, profile.force, profile.lubrication) == (0.5, 0.505, "dry")
@@ -139,8 +141,8 @@ def test_a_file_of_version_1_0_is_read_with_what_it_holds(old, tmp_path):
     with pytest.raises(InputError, match="holds no measured points") as caught:
         memscal.compare(old, apparatus)
     assert "memscal apply" in caught.value.cure
-    found.save(tmp_path / "again.h5")
-    assert memscal.read_stress(tmp_path / "again.h5") == found
+    found.save("again.h5")
+    assert memscal.read_stress("again.h5") == found
 
 
 def test_other_programs_find_a_plottable_group_for_each_load(path):
@@ -160,16 +162,16 @@ def test_a_changed_number_is_found_out(path):
     assert not all(finding.passed for finding in check(path))
 
 
-def test_an_array_of_another_shape_is_refused_by_its_path(tmp_path):
+def test_an_array_of_another_shape_is_refused_by_its_path():
     wrong = make_stress_profile(1.0, x=np.zeros(5))
-    make_stress(profiles=(wrong,)).save(tmp_path / "a.h5")
+    make_stress(profiles=(wrong,)).save("a.h5")
     with pytest.raises(FormatError, match=r"profile_1/x has shape \(5,\), but its axes give"):
-        read_stress(tmp_path / "a.h5")
+        read_stress("a.h5")
     points = make_points(7, np.random.default_rng(0), "zz")
     wrong = make_stress_profile(1.0, points={"zz": replace(points, load=np.zeros(5))})
-    make_stress(profiles=(wrong,)).save(tmp_path / "b.h5")
+    make_stress(profiles=(wrong,)).save("b.h5")
     with pytest.raises(FormatError, match=r"profile_1/normal_load has shape \(5,\), but its axes"):
-        read_stress(tmp_path / "b.h5")
+        read_stress("b.h5")
 
 
 @pytest.mark.parametrize("wrong", [np.ones(5), np.full(7, np.nan), np.ones((7, 0)), np.ones(())])
@@ -204,8 +206,8 @@ def test_covariances_beside_the_profiles_are_read_like_those_within(old):
         np.testing.assert_allclose(profile.covariance, expected, rtol=0, atol=close)
 
 
-def test_what_could_not_be_read_again_is_not_written(tmp_path, monkeypatch):
+def test_what_could_not_be_read_again_is_not_written(monkeypatch):
     monkeypatch.setattr(limits, "MOST_HDF5_BYTES", 2**16)
     with pytest.raises(InputError, match=r"bytes, but at most 65,536 are taken(.|\n)*fewer"):
-        make_stress().save(tmp_path / "a.h5")
-    assert not list(tmp_path.iterdir())
+        make_stress().save("a.h5")
+    assert not list(Path().iterdir())
