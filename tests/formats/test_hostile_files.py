@@ -21,6 +21,8 @@ from memscal.formats.hdf5 import limits
 from memscal.formats.hdf5.writer import DIGEST_ATTRIBUTE
 from memscal.formats.scan import read_scan, write_scan
 
+pytestmark = pytest.mark.usefixtures("folder")
+
 SIGNAL = "/entry/data/u_zz"
 SWEEP = """
 import pathlib, sys
@@ -59,12 +61,13 @@ def filtered(
 
 
 @pytest.fixture
-def path(tmp_path: Path) -> Path:
+def path(folder: Path) -> Path:
     """A good scan without a digest, as another program writes it."""
-    write_scan(make_scan(), tmp_path / "scan.h5")
-    with h5py.File(tmp_path / "scan.h5", "r+") as file:
+    path = folder / "scan.h5"
+    write_scan(make_scan(), path)
+    with h5py.File(path, "r+") as file:
         del file.attrs[DIGEST_ATTRIBUTE]
-    return tmp_path / "scan.h5"
+    return path
 
 
 @pytest.fixture
@@ -99,8 +102,8 @@ def assert_refused_cheaply(path: Path, *words: str) -> None:
     assert peak < 20 * path.stat().st_size + 2**22
 
 
-def test_an_external_link_to_a_pipe_is_refused_without_waiting(edited, tmp_path):
-    os.mkfifo(tmp_path / "pipe.h5")
+def test_an_external_link_to_a_pipe_is_refused_without_waiting(edited):
+    os.mkfifo("pipe.h5")
     path = edited(lambda g: g.__setitem__("u_zz", h5py.ExternalLink("pipe.h5", "/x")))
     assert_refused_cheaply(path, "link")
 
@@ -318,11 +321,11 @@ def test_text_from_a_file_cannot_steer_the_terminal(path):
 
 @pytest.mark.parametrize("libver", ["earliest", "v108", "latest"])
 @pytest.mark.parametrize("further", [0, 5, 30])
-def test_variable_text_is_read_in_every_version_of_the_format(tmp_path, libver, further):
+def test_variable_text_is_read_in_every_version_of_the_format(libver, further):
     """Where attributes are many, HDF5 moves them out of the object's header."""
-    write_scan(make_scan(), tmp_path / "ours.h5")
-    path = tmp_path / "scan.h5"
-    with h5py.File(tmp_path / "ours.h5") as ours, h5py.File(path, "w", libver=libver) as file:
+    write_scan(make_scan(), "ours.h5")
+    path = "scan.h5"
+    with h5py.File("ours.h5") as ours, h5py.File(path, "w", libver=libver) as file:
         ours.copy("/entry", file)
         x = file["/entry/data/x"]
         del file["/entry/title"], file["/entry/indenter/shape"], x.attrs["units"]
@@ -342,8 +345,8 @@ def test_variable_text_is_read_in_every_version_of_the_format(tmp_path, libver, 
 
 @pytest.mark.parametrize("further", [0, 30])
 @pytest.mark.parametrize("place", ["dataset", "attribute"])
-def test_a_variable_text_that_claims_four_gibibytes_is_refused(tmp_path, further, place):
-    path = tmp_path / "scan.h5"
+def test_a_variable_text_that_claims_four_gibibytes_is_refused(further, place):
+    path = Path("scan.h5")
     marker = "a text of 33 bytes to be found..."
     write_scan(make_scan(), path)
     with h5py.File(path, "r+") as file:
@@ -369,24 +372,24 @@ def test_a_text_dataset_longer_than_any_text_is_refused(path):
         read_scan(path)
 
 
-def test_a_folder_a_device_and_a_pipe_are_refused_without_waiting(tmp_path):
-    os.mkfifo(tmp_path / "pipe")
+def test_a_folder_a_device_and_a_pipe_are_refused_without_waiting():
+    os.mkfifo("pipe")
     with pytest.raises(InputError, match="is not a regular file"):
-        read_scan(tmp_path)
-    for path in (tmp_path / "pipe", os.devnull):
+        read_scan(".")
+    for path in ("pipe", os.devnull):
         with pytest.raises(UnsafeFileError, match="not a regular file"):
             read_scan(path)
 
 
-def test_a_missing_file_and_a_name_that_is_none_are_input_errors(tmp_path):
+def test_a_missing_file_and_a_name_that_is_none_are_input_errors():
     with pytest.raises(InputError, match=r"missing\.h5 cannot be read: No such file"):
-        read_scan(tmp_path / "missing.h5")
+        read_scan("missing.h5")
     with pytest.raises(InputError, match="cannot be read"):
         read_scan("a\0b")
 
 
-def test_a_file_over_the_size_limit_is_refused_unread(tmp_path):
-    path = tmp_path / "large.h5"
+def test_a_file_over_the_size_limit_is_refused_unread():
+    path = Path("large.h5")
     with path.open("wb") as file:
         file.truncate(2**30 + 1)  # sparse: it takes no room on the disk
     with pytest.raises(UnsafeFileError, match="1,073,741,825 bytes"):

@@ -17,17 +17,16 @@ from memscal.formats.scan import write_scan
 from memscal.model.provenance import timestamp
 
 
-@pytest.fixture
-def folder(tmp_path: Path) -> Path:
-    write_scan(make_scan("raster"), tmp_path / "scan.h5")
-    write_reference(make_profile(friction_coefficient=float("inf")), tmp_path / "reference.h5")
-    write_artifact(make_artifact(), tmp_path / "artifact.h5")
-    return tmp_path
+@pytest.fixture(autouse=True)
+def _files(folder: Path) -> None:
+    write_scan(make_scan("raster"), "scan.h5")
+    write_reference(make_profile(friction_coefficient=float("inf")), "reference.h5")
+    write_artifact(make_artifact(), "artifact.h5")
 
 
 @pytest.mark.parametrize("name", ["scan", "reference", "artifact"])
-def test_a_sound_file_is_found_in_order_and_described_in_standard_json(folder, name):
-    path = folder / f"{name}.h5"
+def test_a_sound_file_is_found_in_order_and_described_in_standard_json(name):
+    path = f"{name}.h5"
     passed = {f.name: f.passed for f in check(path)}
     assert list(passed.items()) == [(n, True) for n in ("safety", "schema", "digest", "content")]
     found = describe(path)
@@ -35,48 +34,48 @@ def test_a_sound_file_is_found_in_order_and_described_in_standard_json(folder, n
     assert json.loads(json.dumps(found, allow_nan=False)) == found
 
 
-def test_a_scan_of_another_program_fails_at_what_it_lacks(folder):
-    with h5py.File(folder / "scan.h5", "r+") as file:
+def test_a_scan_of_another_program_fails_at_what_it_lacks():
+    with h5py.File("scan.h5", "r+") as file:
         del file.attrs["memscal_content_sha256"], file["/entry/indenter/radius"]
-    last = check(folder / "scan.h5")[-1]
+    last = check("scan.h5")[-1]
     assert (last.name, last.passed) == ("content", False)
     assert "/entry/indenter/radius" in last.meaning
 
 
-def test_an_uncertainty_without_a_value_is_refused_by_its_path(folder):
-    with h5py.File(folder / "reference.h5", "r+") as file:
+def test_an_uncertainty_without_a_value_is_refused_by_its_path():
+    with h5py.File("reference.h5", "r+") as file:
         del file.attrs["memscal_content_sha256"]
         file["/entry/parameters/depth_errors"] = np.zeros(0)
         file["/entry/parameters/depth_errors"].attrs["units"] = "mm"
     with pytest.raises(FormatError, match="depth_errors has 0 values"):
-        describe(folder / "reference.h5")
+        describe("reference.h5")
 
 
 @pytest.mark.parametrize("number", ["NaN", "Infinity", "-Infinity", "1e999"])
-def test_stored_json_with_a_number_that_is_none_is_refused(folder, number):
-    with h5py.File(folder / "artifact.h5", "r+") as file:
+def test_stored_json_with_a_number_that_is_none_is_refused(number):
+    with h5py.File("artifact.h5", "r+") as file:
         text = file["/entry/process/configuration/data"][()].decode()
         del file["/entry/process/configuration/data"]
         file["/entry/process/configuration/data"] = text.replace("0.1", number)
     for read in (describe, load_apparatus):
         with pytest.raises(InputError, match=f"configuration/data is not JSON: {number}"):
-            read(folder / "artifact.h5", accept_altered=True)
+            read("artifact.h5", accept_altered=True)
 
 
-def test_what_is_no_file_of_ours_fails_at_the_first_step(tmp_path):
-    (tmp_path / "a.h5").write_bytes(b"text")
-    with h5py.File(tmp_path / "b.h5", "w"):
+def test_what_is_no_file_of_ours_fails_at_the_first_step():
+    Path("a.h5").write_bytes(b"text")
+    with h5py.File("b.h5", "w"):
         pass
-    for path in (tmp_path, tmp_path / "a.h5", tmp_path / "b.h5", tmp_path / "missing.h5"):
+    for path in (".", "a.h5", "b.h5", "missing.h5"):
         (finding,) = check(path)
         assert (finding.name, finding.passed) == ("safety", False)
         assert finding.meaning
 
 
-def test_a_newer_version_fails_at_the_schema(folder):
-    with h5py.File(folder / "scan.h5", "r+") as file:
+def test_a_newer_version_fails_at_the_schema():
+    with h5py.File("scan.h5", "r+") as file:
         file.attrs["memscal_schema_version"] = "2.0.0"
-    last = check(folder / "scan.h5")[-1]
+    last = check("scan.h5")[-1]
     assert (last.name, last.passed) == ("schema", False)
     assert "newer" in last.meaning
 

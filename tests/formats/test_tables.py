@@ -32,9 +32,9 @@ def scan_table(text: str, **options: Any) -> ImportedScan:
     return imported(table, **given)
 
 
-def rows(*columns: Any, header: str, separator: str = ",") -> str:
+def rows(*columns: Any, header: str) -> str:
     """Write columns as text with full precision."""
-    lines = [separator.join(f"{v!r}" for v in row) for row in zip(*columns, strict=True)]
+    lines = [",".join(f"{v!r}" for v in row) for row in zip(*columns, strict=True)]
     return "\n".join([header, *lines])
 
 
