@@ -69,10 +69,10 @@ def altered(path: Path) -> Path:
     ],
 )
 @pytest.mark.usefixtures("artifact")
-def test_an_altered_file_is_used_by_no_command_unless_that_is_recorded(run, scan, folder, line):
+def test_an_altered_file_is_used_by_no_command_unless_that_is_recorded(run, scan, line):
     arguments = line.split()
     altered(scan)
-    (folder / "manifest").write_text("scan.h5\n")
+    Path("manifest").write_text("scan.h5\n")
     batch = arguments[0] == "batch"
     words = "was changed after it was written: its content does not fit its digest"
     if not batch:
@@ -99,14 +99,14 @@ def test_an_altered_file_is_used_by_no_command_unless_that_is_recorded(run, scan
         ),
     ],
 )
-def test_a_scan_of_no_use_is_refused(refused, folder, scan, words):
-    memscal.write_scan(scan, folder / "scan.h5")
+def test_a_scan_of_no_use_is_refused(refused, scan, words):
+    memscal.write_scan(scan, "scan.h5")
     refused("scan.h5", words=words)
 
 
-def test_a_reference_shorter_than_the_scan_is_refused(refused, scan, folder):
+def test_a_reference_shorter_than_the_scan_is_refused(refused, scan):
     rod = press_rod(SCAN.film, memscal.Rod(radius=0.25e-3), 1.0)
-    memscal.write_reference(rod.profile(np.linspace(0.0, 2e-3, 100)), folder / "short.h5")
+    memscal.write_reference(rod.profile(np.linspace(0.0, 2e-3, 100)), "short.h5")
     for further in ([], ["--dry-run"]):
         words = ("ends at r = 2 mm", "Extend the reference")
         refused(scan, "--reference", "short.h5", *further, words=words)
