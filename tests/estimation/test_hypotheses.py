@@ -2,7 +2,6 @@
 
 import re
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -91,26 +90,33 @@ def test_a_hysteresis_is_found_and_measured_within_its_uncertainty(differences):
 PASSES = line(step=0.5e-3)
 
 
-def passes(seed: int, *, stated: bool = True, **given: Any) -> Scan:
+def passes(
+    seed: int,
+    *,
+    pairs: int = 1,
+    lag: float = 0.0,
+    creep: float = 0.0,
+    play: float = 0.0,
+    wander: float = 0.0,
+    louder: float = 1.0,
+    offset: float = 0.0,
+    stated: bool = True,
+    named: bool = True,
+) -> Scan:
     """Passes forth and back over a sensor, each pair with its own disturbances."""
-    pairs = given.get("pairs", 1)
     side = np.tile([1.0, -1.0], pairs)
     rng = np.random.default_rng(seed)
-    lag = given.get("lag", 0.0) * side
-    shift = given.get("play", 0.0) * side + given.get("wander", 0.0) * rng.standard_normal(
-        side.size
-    )
-    share = given.get("creep", 0.0)
+    shift = play * side + wander * rng.standard_normal(side.size)
     noise = np.full(side.size, 0.003)
-    noise[-1] *= given.get("louder", 1.0)
+    noise[-1] *= louder
     rows = []
-    for own, moved in zip(lag, shift, strict=True):
+    for own, moved in zip(lag * side, shift, strict=True):
         at_once = ROUND.voltages(PASSES + moved)
         late = replace(ROUND, lag=own).voltages(PASSES + moved)
-        rows.append((1 - share) * at_once + share * late)
+        rows.append((1 - creep) * at_once + creep * late)
     u = np.array(rows)
     top = u.max()
-    u[-1] += given.get("offset", 0.0) * top
+    u[-1] += offset * top
     u += top * noise[:, None] * rng.standard_normal(u.shape)
     return Scan(
         x=PASSES,
@@ -119,7 +125,7 @@ def passes(seed: int, *, stated: bool = True, **given: Any) -> Scan:
         load=ROUND.load,
         indenter=memscal.Rod(radius=ROUND.radius),
         film=outside.FILM,
-        branch=["approach", "retreat"] * pairs if given.get("named", True) else None,
+        branch=BOTH["branch"] * pairs if named else None,
     )
 
 

@@ -18,11 +18,13 @@ from memscal.formats.inspection import check
 from memscal.formats.reference import read_reference, write_reference
 from memscal.formats.scan import read_scan, write_scan
 
+pytestmark = pytest.mark.usefixtures("folder")
+
 
 @pytest.fixture
-def artifact(tmp_path: Path) -> Path:
-    write_artifact(make_artifact(), tmp_path / "a.h5")
-    return tmp_path / "a.h5"
+def artifact(folder: Path) -> Path:
+    write_artifact(make_artifact(), "a.h5")
+    return folder / "a.h5"
 
 
 def altered(path: str, index: Any, change: Callable[[Any], Any]) -> Callable[[h5py.File], None]:
@@ -57,14 +59,14 @@ def test_an_artifact_that_was_altered_is_refused(artifact, change):
     assert "calibration" in caught.value.cure
 
 
-def test_a_copy_made_by_another_program_still_fits_its_digest(artifact, tmp_path):
+def test_a_copy_made_by_another_program_still_fits_its_digest(artifact):
     """The digest is over the content, not over the bytes of the file."""
-    with h5py.File(artifact) as old, h5py.File(tmp_path / "copy.h5", "w", libver="latest") as new:
+    with h5py.File(artifact) as old, h5py.File("copy.h5", "w", libver="latest") as new:
         old.copy("/entry", new)
         for name, value in old.attrs.items():
             new.attrs[name] = value
-    assert (tmp_path / "copy.h5").read_bytes() != artifact.read_bytes()
-    assert load_apparatus(tmp_path / "copy.h5").load == 1.0
+    assert Path("copy.h5").read_bytes() != artifact.read_bytes()
+    assert load_apparatus("copy.h5").load == 1.0
 
 
 def test_what_other_programs_add_is_ignored(artifact):
@@ -89,9 +91,9 @@ READERS: dict[str, Any] = {
 
 
 @pytest.mark.parametrize(("kind", "path"), [(k, p) for k, of in ADDITIONS.items() for p in of])
-def test_no_reader_uses_what_was_added_or_changed_unless_that_is_accepted(tmp_path, kind, path):
+def test_no_reader_uses_what_was_added_or_changed_unless_that_is_accepted(kind, path):
     """A path that the reader knows and the list lacks, and a number that does not fit."""
-    file_path = tmp_path / f"{kind}.h5"
+    file_path = Path(f"{kind}.h5")
     if kind == "scan":
         write_scan(make_scan(film=make_film(roughness_rms=None), load_uncertainty=None), file_path)
     elif kind == "reference":
@@ -123,8 +125,8 @@ def test_no_reader_uses_what_was_added_or_changed_unless_that_is_accepted(tmp_pa
 
 
 @pytest.fixture(params=["scan", "reference", "artifact"])
-def versioned(request: pytest.FixtureRequest, tmp_path: Path) -> Any:
-    path = tmp_path / f"{request.param}.h5"
+def versioned(request: pytest.FixtureRequest, folder: Path) -> Any:
+    path = folder / f"{request.param}.h5"
     write: Any
     read: Any
     write, read, thing = {
@@ -182,10 +184,10 @@ def test_an_older_major_version_and_what_is_none_are_refused(versioned, version)
         versioned(version)
 
 
-def test_the_wrong_kind_of_file_is_refused_by_name(artifact, tmp_path):
+def test_the_wrong_kind_of_file_is_refused_by_name(artifact):
     with pytest.raises(FormatError, match=r'"memscal-artifact", but "memscal-scan"'):
         read_scan(artifact)
-    with h5py.File(tmp_path / "foreign.h5", "w") as file:
+    with h5py.File("foreign.h5", "w") as file:
         file["x"] = 1.0
     with pytest.raises(FormatError, match="no memscal schema"):
-        read_scan(tmp_path / "foreign.h5")
+        read_scan("foreign.h5")
