@@ -197,24 +197,18 @@ _ENOUGH = 10_000
 
 def clipped_points(estimate: ProfileEstimate) -> BoolArray:
     """Say which points were held at a ceiling, shape (n,), of a channel that is no shear."""
-    u = estimate.points.u
-    clipped = np.zeros(u.size, dtype=np.bool_)
-    # Noise of each point as if none were an outlier.
-    stated = estimate.points.u_errors
-    ordinary = estimate.noise_scale * (np.ones_like(u) if stated is None else stated)
+    clipped = np.zeros(estimate.points.u.size, dtype=np.bool_)
     for scan in range(estimate.points.scans):
         inside = estimate.points.scan == scan
-        agreeing, top = _agreeing(estimate, inside, float(np.median(ordinary[inside])))
-        for flat in (agreeing, _plateau(estimate, inside, ordinary)):
-            if not top.any() and _risen_above(estimate, flat, ordinary):
+        agreeing, top = _agreeing(estimate, inside)
+        for flat in (agreeing, _plateau(estimate, inside)):
+            if not top.any() and _risen_above(estimate, flat):
                 top = flat
         clipped |= top
     return clipped
 
 
-def _agreeing(
-    estimate: ProfileEstimate, inside: BoolArray, noise: float
-) -> tuple[BoolArray, BoolArray]:
+def _agreeing(estimate: ProfileEstimate, inside: BoolArray) -> tuple[BoolArray, BoolArray]:
     """Highest readings (n,) of a scan that agree, and those far better than the fit has them."""
     rows = np.flatnonzero(inside)
     falling, counts, apart = agreeing_tops(estimate.points.u[rows])
@@ -228,7 +222,7 @@ def _agreeing(
     new[np.unique(estimate.points.place_numbers("index")[rows], return_index=True)[1]] = 1.0
     places = np.maximum(np.cumsum(new), 2.0)
     closer = np.maximum(_CLOSER ** (2 / (places - 1)), _LEAST_CLOSER)
-    least = max(_OF_NOISE * noise, _FLAT * estimate.largest_signal)
+    least = max(_OF_NOISE * np.median(estimate.noise[inside]), _FLAT * estimate.largest_signal)
     better = (differ > closer * apart) & (differ > least) & (highest > u[0])
     tops = []
     for some in (counts, counts[better[counts - 1]]):
@@ -238,7 +232,7 @@ def _agreeing(
     return tops[0], tops[1]
 
 
-def _risen_above(estimate: ProfileEstimate, plateau: BoolArray, noise: FloatArray) -> bool:
+def _risen_above(estimate: ProfileEstimate, plateau: BoolArray) -> bool:
     """Whether the profile through all other points rises above a plateau of a scan."""
     if plateau.sum() < FEWEST_AT_CEILING:
         return False
@@ -269,18 +263,18 @@ def _risen_above(estimate: ProfileEstimate, plateau: BoolArray, noise: FloatArra
     share = plateau[chosen] / plateau[chosen].sum()
     overshoot = -(share @ weighed.residual)
     slope = reduced.summed(share) @ basis.columns(reduced)
-    variance = share**2 @ noise[chosen] ** 2 + slope @ weighed.covariance @ slope
+    variance = share**2 @ estimate.noise[chosen] ** 2 + slope @ weighed.covariance @ slope
     return bool(overshoot > -ndtri(FALSE_ALARM) * np.sqrt(variance))
 
 
-def _plateau(estimate: ProfileEstimate, inside: BoolArray, noise: FloatArray) -> BoolArray:
-    """Points of a scan about its centre that are equal within the noise (n,), in V."""
+def _plateau(estimate: ProfileEstimate, inside: BoolArray) -> BoolArray:
+    """Points of a scan about its centre that are equal within the noise."""
     order = np.argsort(np.where(inside, estimate.distance, np.inf), kind="stable")
     u = estimate.points.u[order]
     plateau = np.zeros_like(inside)
     # Scatter about the mean of the first points, for every number of them.
     half = int(inside.sum()) // 2
-    weight = noise[order][:half] ** -2
+    weight = estimate.noise[order][:half] ** -2
     offset = u[:half] - u[:1]
     total, first, second = (np.cumsum(weight * offset**power) for power in range(3))
     scatter = second - first**2 / total
