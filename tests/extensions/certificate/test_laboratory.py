@@ -7,15 +7,16 @@ import pytest
 import memscal
 from memscal.cli import main
 from memscal.errors import MemscalError
-from memscal.extensions.certificate.laboratory import Measured, read_laboratory
+from memscal.extensions.certificate.laboratory import LaboratoryFile, Measured, read_laboratory
+
+pytestmark = pytest.mark.usefixtures("folder")
 
 SHIPPED = Path(__file__).parents[3] / "calibration_data" / "lab.toml"
 
 
-def written(folder: Path, text: str) -> Path:
-    path = folder / "lab.toml"
-    path.write_text(text, encoding="utf-8")
-    return path
+def read(text: str) -> LaboratoryFile:
+    Path("lab.toml").write_text(text, encoding="utf-8")
+    return read_laboratory("lab.toml")
 
 
 @pytest.mark.parametrize(
@@ -46,18 +47,18 @@ def written(folder: Path, text: str) -> Path:
         ("[sensor\n", "no TOML"),
     ],
 )
-def test_what_a_file_may_not_hold_is_refused_by_name(tmp_path, text, words):
+def test_what_a_file_may_not_hold_is_refused_by_name(text, words):
     with pytest.raises(MemscalError) as refusal:
-        read_laboratory(written(tmp_path, text))
+        read(text)
     assert words in str(refusal.value)
     assert "lab.toml" in str(refusal.value)
 
 
-def test_degrees_celsius_are_kelvins_of_another_zero_and_the_same_uncertainty(tmp_path):
+def test_degrees_celsius_are_kelvins_of_another_zero_and_the_same_uncertainty():
     for value, unit in ((23.0, "degC"), (23.0, "°C"), (296.15, "K")):
         quantity = f'{{value = {value}, unit = "{unit}", uncertainty = 0.3}}'
-        read = read_laboratory(written(tmp_path, f"[conditions]\ntemperature = {quantity}"))
-        assert read.stated("conditions", "temperature") == pytest.approx(Measured(296.15, 0.3))
+        found = read(f"[conditions]\ntemperature = {quantity}")
+        assert found.stated("conditions", "temperature") == pytest.approx(Measured(296.15, 0.3))
 
 
 IMPORT = (
@@ -66,20 +67,19 @@ IMPORT = (
 )
 
 
-def imported(folder: Path, *options: str) -> int:
+def imported(*options: str) -> int:
     """Import a simulated scan from a table with the shipped file; return the exit code."""
     scan = memscal.simulate(seed=1)
-    table = folder / "scan.csv"
     lines = [f"{x * 1e3},{u * 1e3}" for x, u in zip(scan.x, scan.u_zz, strict=True)]
-    table.write_text("\n".join(["x,U", *lines]), encoding="utf-8")
-    given = [*IMPORT.split(), "-o", str(folder / "scan.h5"), "--lab", str(SHIPPED), *options]
-    return main(["import", str(table), *given])
+    Path("scan.csv").write_text("\n".join(["x,U", *lines]), encoding="utf-8")
+    given = [*IMPORT.split(), "-o", "scan.h5", "--lab", str(SHIPPED), *options]
+    return main(["import", "scan.csv", *given])
 
 
-def test_an_imported_scan_and_its_artifact_carry_the_file_but_no_customer(tmp_path):
-    assert imported(tmp_path) == 0
-    scan = tmp_path / "scan.h5"
-    artifact = tmp_path / "artifact.h5"
+def test_an_imported_scan_and_its_artifact_carry_the_file_but_no_customer():
+    assert imported() == 0
+    scan = Path("scan.h5")
+    artifact = Path("artifact.h5")
     memscal.calibrate(scan).apparatus.save(artifact)
     for held in (memscal.read_scan(scan), memscal.load_apparatus(artifact)):
         assert held.sensor.serial_number == "SN-PLACEHOLDER-1"
@@ -97,6 +97,6 @@ def test_an_imported_scan_and_its_artifact_carry_the_file_but_no_customer(tmp_pa
         assert b"A. Placeholder" not in content
 
 
-def test_a_scan_that_says_otherwise_than_the_file_is_refused(tmp_path, capsys):
-    assert imported(tmp_path, "--sensor-name", "another") == 3
+def test_a_scan_that_says_otherwise_than_the_file_is_refused(capsys):
+    assert imported("--sensor-name", "another") == 3
     assert "name of the sensor is 'a simulated sensor'" in capsys.readouterr().err

@@ -96,7 +96,7 @@ def tables(results: Path) -> pd.DataFrame:
 
 
 def test_a_row_says_what_a_calibration_says(results, fleet):
-    rows = pd.read_parquet(results / "shards")
+    rows = tables(results)
     assert list(rows["place"]) == list(range(COUNT))
     path = fleet / "scans" / "s01.h5"
     row = rows.iloc[1]
@@ -140,7 +140,7 @@ def test_units_and_versions_stand_in_the_schema(results):
 
 
 def test_what_fails_is_a_row_and_failed_checks_have_an_artifact(results):
-    rows = pd.read_parquet(results / "shards")
+    rows = tables(results)
     errors = rows[rows["error"].notna()]
     assert list(errors["place"]) == [FLAT, NONSENSE, MISSING]
     assert list(errors["error_class"]) == ["InputError", "FormatError", "InputError"]
@@ -230,13 +230,13 @@ def test_a_missing_extra_is_named(module, line, monkeypatch, fleet, results, fol
 
 def test_a_scheduler_that_does_not_answer_is_an_error(monkeypatch, fleet, folder, run):
     monkeypatch.setattr("memscal.parallel._CONNECTING", 0.5)
-    line = ["batch", fleet / "scans", "-o", folder / "results", "--scheduler"]
+    line = ["batch", fleet / "scans", "-o", "results", "--scheduler"]
     run(*line, "tcp://127.0.0.1:9").exits(3, "No scheduler answers at tcp://127.0.0.1:9")
 
 
 def test_ctrl_c_ends_a_batch_at_once(fleet, folder):
-    process = batch(fleet / "wafer.csv", folder / "results")
-    while not (folder / "results" / "shards").exists():
+    process = batch(fleet / "wafer.csv", "results")
+    while not Path("results", "shards").exists():
         time.sleep(0.01)
     process.send_signal(signal.SIGINT)
     assert process.wait(timeout=30) == 130
@@ -246,14 +246,14 @@ def test_the_report_of_a_batch_is_its_summary(copy, folder, run):
     line = arguments(copy / "wafer.csv", copy / "results", "--resume", "--report")
     page = copy / "results" / "page.html"
     run(*line, str(page)).exits(1, "Written")
-    run("summary", copy / "results", "-o", folder / "page.html").exits(0)
+    run("summary", copy / "results", "-o", "page.html").exits(0)
     assert page.read_text(encoding="utf-8") == (folder / "page.html").read_text(encoding="utf-8")
     run(*line, str(page)).exits(4, "exists already")
 
 
 def test_a_summary_as_json_is_that_of_the_tables(results, folder, run):
-    told = run("summary", results, "-o", folder / "page.html", "--json").exits(0).json
-    rows = pd.read_parquet(results / "shards")
+    told = run("summary", results, "-o", "page.html", "--json").exits(0).json
+    rows = tables(results)
     a = rows["conversion_constant"]
     assert told["conversion_constant"]["median"] == pytest.approx(a.median())
     spread = 1.4826 * (a - a.median()).abs().median()
