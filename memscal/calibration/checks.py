@@ -232,7 +232,9 @@ def _field_shape(solution: Solution, results: Results) -> list[QualityCheck]:
     g = solution.deconvolution.g.image
     checks = []
     if results.field_errors is not None:
-        lobe = float(np.max(-g - _SURE * results.field_errors[1]) / g.max())
+        # Farther out G is tapered to zero.
+        inside = solution.deconvolution.g.grid.radius < fields.support / 2
+        lobe = float(np.max((-g - _SURE * results.field_errors[1])[inside]) / g.max())
         meaning = (
             f"Depth of the deepest lobe of G over the plane beyond {_SURE:g} standard "
             "uncertainties, over the largest G. A failure means that G has ripples that its "
