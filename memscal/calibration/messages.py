@@ -47,20 +47,7 @@ def calibration_messages(
         messages.append(laws.message)
     if prepared.thickness is not None:
         messages += prepared.thickness.messages
-    unloaded = [s for s in prepared.as_stated if s.load is None and s.normal_load is None]
-    if prepared.reading.per == "Pa" and unloaded:
-        text = (
-            "No load is stated: it is taken to be that of the reference, "
-            f"{solution.scan.stated_load:.4g} N (--relative takes none)."
-        )
-        messages.append(Message("load_of_reference", text))
-    solved = prepared.request.reference is None and prepared.as_stated[0].reference is None
-    if prepared.reading.relative and unloaded and solved:
-        text = (
-            f"No load is stated: {stress.load:.3g} N is taken, under which the shape of the "
-            "stress is calculated; of a linear film it is that of any load (--film-law linear)."
-        )
-        messages.append(Message("load_of_reference", text))
+    messages += _unstated_load(prepared, solution)
     messages += quality.failed_check_messages(checks)
     if estimate.points.order:
         text = (
@@ -102,6 +89,26 @@ def calibration_messages(
     if solution.scan.synthetic is not None:
         messages.append(Message("synthetic", "The scan is synthetic: its truth is stored in it."))
     return tuple(messages)
+
+
+def _unstated_load(prepared: Prepared, solution: Solution) -> list[Message]:
+    """Say what load is taken where a scan states none."""
+    if all(s.load is not None or s.normal_load is not None for s in prepared.as_stated):
+        return []
+    solved = prepared.request.reference is None and prepared.as_stated[0].reference is None
+    if prepared.reading.per == "Pa":
+        text = (
+            "No load is stated: it is taken to be that of the reference, "
+            f"{solution.scan.stated_load:.4g} N (--relative takes none)."
+        )
+    elif prepared.reading.relative and solved:
+        text = (
+            f"No load is stated: {solution.stress.load:.3g} N is taken, under which the shape of "
+            "the stress is calculated; of a linear film it is that of any load (--film-law linear)."
+        )
+    else:
+        return []
+    return [Message("load_of_reference", text)]
 
 
 def _centres(solution: Solution) -> Message:
