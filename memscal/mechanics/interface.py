@@ -53,11 +53,11 @@ class GreenwoodTripp:
 
     Examples
     --------
-    In the units of the original paper, with its parameter mu = 4, the pressure at d = sigma:
+    In the lengths of the original paper, with its parameter mu = 4, the pressure at d = sigma:
 
-    >>> film = ElasticFilm(young_modulus=0.75, poisson_ratio=0.5, thickness=1.0)
+    >>> film = ElasticFilm(young_modulus=0.75e6, poisson_ratio=0.5, thickness=1.0)
     >>> law = GreenwoodTripp(roughness=1.0, asperity_density=3.0, asperity_radius=1.0)
-    >>> round(float(law.pressure(np.array(1.0), film)), 4)
+    >>> round(1e-6 * float(law.pressure(np.array(1.0), film)), 4)  # in MPa
     0.3027
     """
 
