@@ -562,11 +562,8 @@ def _prediction(estimate: ProfileEstimate, what: str, group: IndexArray) -> Qual
         "scan": "the scans are not of the same sensor, film and reference; calibrate each by "
         "itself and compare",
     }
-    scale = (
-        ""
-        if estimate.points.u_errors is not None
-        else ", over the others' own scatter as no noise is stated"
-    )
+    stated = estimate.points.u_errors is not None
+    scale = "" if stated else ", over the others' own scatter as no noise is stated"
     joined = "" if worst.alone else f", {what}s taken several at a time"
     meaning = (
         f"Chi-square per degree of one {what}'s voltages against their prediction from the others, "

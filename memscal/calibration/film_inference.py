@@ -156,9 +156,7 @@ def _input_columns(solution: Solution, without: str = "") -> FloatArray:
     for balance in dict.fromkeys(balances):
         _, load, u = balance
         weighed = np.array([other == balance for other in balances])[estimate.points.scan]
-        columns.append(
-            np.where(weighed, (estimate.predicted - estimate.background) * (u or 0.0) / load, 0.0)
-        )
+        columns.append(np.where(weighed, estimate.signal * (u or 0.0) / load, 0.0))
     return np.stack(columns, axis=1)
 
 

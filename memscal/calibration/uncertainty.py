@@ -150,9 +150,7 @@ def _load_effects(
             continue
         by_scan = np.array([share or 0.0 for share in stated])
         apart = (by_scan - by_scan.mean())[estimate.points.scan]
-        effects[source] = InputEffect(
-            -apart * (estimate.predicted - estimate.background), -float(by_scan.mean())
-        )
+        effects[source] = InputEffect(-apart * estimate.signal, -float(by_scan.mean()))
     return effects
 
 
@@ -165,9 +163,7 @@ def _varying_gain(estimate: ProfileEstimate) -> float:
     if repeats.size == 1 or points.owner.any():
         return 0.0
     lines = estimate.model.straight_columns
-    columns = np.column_stack(
-        [estimate.predicted - estimate.background, estimate.weighed.residual, lines]
-    )
+    columns = np.column_stack([estimate.signal, estimate.weighed.residual, lines])
     columns = points.standardised(columns, estimate.weights / estimate.noise_scale**2)
     products = []
     for repeat in repeats:
@@ -591,7 +587,7 @@ def _division_map(
     normalised = np.vstack([rings, by_radius, transfer])
     gain = fields.gain(smoothed) if isinstance(fields, RasterFields) else smoothed.gain
     direct = normalised @ synthesis @ gain
-    geometry = estimate.model.geometry(estimate.centres)
+    geometry = model.geometry(estimate.centres)
     nuisance = np.hstack([model.centre_derivative(geometry, estimate.kernel), model.drift_columns])
     kernels = np.column_stack([estimate.kernel, basis.kernels(model.k)])
     count = kernels.shape[1] if estimate.points.u.size <= DENSE else _COLUMNS

@@ -49,7 +49,7 @@ class Influence:
 
 def influences(scans: Sequence[Scan], estimate: ProfileEstimate) -> dict[str, Influence]:
     """Return the influence of everything that is taken for granted, by name."""
-    signal = estimate.predicted - estimate.background
+    signal = estimate.signal
     largest = estimate.largest_signal
     model = estimate.model
     slope = model.radial_derivative(estimate.gaussian.geometry, estimate.kernel)
@@ -78,7 +78,7 @@ def _of_lines(estimate: ProfileEstimate) -> dict[str, Influence]:
     second = ((fit.sigma * model.k) ** 2 / 2 * gaussian_transfer(model.k, fit.sigma))[:, None]
     oval = model.around(2, second, second[:, :0], fit.centre)[:, 0]
     away = _OFF * fit.sigma
-    passing = estimate.model.geometry(estimate.centres)
+    passing = model.geometry(estimate.centres)
     beside = replace(passing, radius=np.hypot(passing.radius, away))
     change = model.signal(beside, estimate.kernel) - model.signal(passing, estimate.kernel)
     return {

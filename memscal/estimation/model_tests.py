@@ -141,9 +141,7 @@ def linearity_test(estimate: ProfileEstimate) -> ExtraColumns | None:
     mean = load.mean()
     if np.ptp(load) < _SAME_LOAD * mean:
         return None
-    return _add(
-        estimate, ((estimate.predicted - estimate.background) * (load - mean) / mean)[:, None]
-    )
+    return _add(estimate, (estimate.signal * (load - mean) / mean)[:, None])
 
 
 def _widened(estimate: ProfileEstimate, factors: tuple[float, ...]) -> FloatArray:
@@ -162,7 +160,7 @@ def _add(estimate: ProfileEstimate, columns: FloatArray) -> ExtraColumns:
     scale = np.abs(columns).max(axis=0)
     columns = columns / scale
     jacobian = estimate.gaussian.jacobian
-    count = estimate.gaussian.jacobian.shape[1] - points.ellipse
+    count = jacobian.shape[1] - points.ellipse
     gaussian = jacobian[:, :count] / np.linalg.norm(jacobian[:, :count], axis=0)
     left = (estimate.weighed.residual + estimate.oval)[:, None]
     # What the triangular factor has below the rows of the round columns is free of them.

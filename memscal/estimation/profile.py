@@ -192,11 +192,7 @@ class ProfileEstimate:
         """What a sensor that is not round adds to the radial profile's voltages, (n,), in V."""
         if not self.points.ellipse:
             return np.zeros_like(self.points.u)
-        return (
-            self.predicted
-            - self.background
-            - self.model.signal(self.model.geometry(self.centres), self.kernel)
-        )
+        return self.signal - self.model.signal(self.model.geometry(self.centres), self.kernel)
 
     @property
     def uneven(self) -> FloatArray:
@@ -228,9 +224,14 @@ class ProfileEstimate:
         return self.points.u - self.weighed.residual
 
     @property
+    def signal(self) -> FloatArray:
+        """Predicted voltage above the background at each point, shape (n,), in V."""
+        return self.predicted - self.background
+
+    @property
     def largest_signal(self) -> float:
         """Largest voltage above the background, in V."""
-        return float(np.abs(self.predicted - self.background).max())
+        return float(np.abs(self.signal).max())
 
 
 def estimate_profile(
@@ -442,7 +443,7 @@ def _why_undetermined(estimate: ProfileEstimate, *, shown: bool) -> str:
     varies = f"Beside a line the voltage varies by {varied}, {ratio:.3g} times its noise"
     if ratio < _LEAST_RISE:
         return f"{varies}: it does not rise above its noise as the indenter passes."
-    signal = np.abs(estimate.predicted - estimate.background)
+    signal = np.abs(estimate.signal)
     farthest = int(np.argmax(estimate.distance))
     left = signal[farthest] / signal.max()
     if left > _LEFT:

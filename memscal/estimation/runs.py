@@ -125,7 +125,7 @@ def hysteresis_test(estimate: ProfileEstimate) -> BranchesApart | None:
     geometry = model.geometry(estimate.centres)
     sigma = estimate.gaussian.sigma
     wider = estimate.conversion_constant * sigma * gaussian_transfer_slope(model.k, sigma)
-    columns = [estimate.predicted - estimate.background, model.signal(geometry, wider)]
+    columns = [estimate.signal, model.signal(geometry, wider)]
     mean = np.bincount(points.scan, sign) / np.bincount(points.scan)
     both = np.abs(mean)[points.scan] < np.abs(sign)
     if both.any():
@@ -198,8 +198,8 @@ def compare_runs(estimate: ProfileEstimate) -> RunsApart | None:
     if count == 1:
         return None
     own = np.equal.outer(number, np.arange(count)).astype(np.float64)
-    signal = estimate.predicted - estimate.background
-    fit = _Fit.of(estimate, np.hstack([own[:, 1:] * signal[:, None], own]))
+    gains = own[:, 1:] * estimate.signal[:, None]
+    fit = _Fit.of(estimate, np.hstack([gains, own]))
     if fit is None:
         return None
     # A run's baseline is its scan's and its own, whatever share of both is which.

@@ -198,7 +198,7 @@ class _Found:
 
 def _found(scan: Scan, apparatus: ApparatusFunction, points: ScanPoints) -> _Found:
     estimate, _ = gaussian_pressure(scan, apparatus, points)
-    signal = estimate.predicted - estimate.background
+    signal = estimate.signal
     rest = estimate.weighed.residual
     weight = estimate.outlier_weight
     count = estimate.gaussian.jacobian.shape[1]
