@@ -365,7 +365,8 @@ class Weighing:
         probabilities = []
         for prior in _PRIORS:
             # Bayes' theorem; negligible probabilities are set to zero.
-            weight = prior * np.exp(self.log_marginals - self.log_marginals[prior > 0].max())
+            held = np.where(prior > 0, self.log_marginals, -np.inf)
+            weight = prior * np.exp(held - held.max())
             weight[weight < _NEGLIGIBLE * weight.sum()] = 0.0
             probabilities.append(weight / weight.sum())
         estimate, uncertainty = probabilities

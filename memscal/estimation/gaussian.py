@@ -330,13 +330,16 @@ def _solve(
     # A robust fit is the start of the next one: a low accuracy is enough.
     knee = _KNEE if robust else np.inf
     tolerance = 1e-4 if robust else 1e-9
-    solution = gauss_newton(linearised, begin, tolerance=tolerance, knee=knee)
-    # At a width of zero every slope by the width is zero: steps do not leave it.
-    if solution is None or solution[1] < _NARROWEST:
-        result = _trust_region(linearised, begin, robust)
-        if not result.success:
-            raise _undetermined(model, linearise(model, result.x * scale).conversion_constant)
-        solution = result.x
+    try:
+        solution = gauss_newton(linearised, begin, tolerance=tolerance, knee=knee)
+        # At a width of zero every slope by the width is zero: steps do not leave it.
+        if solution is None or solution[1] < _NARROWEST:
+            result = _trust_region(linearised, begin, robust)
+            if not result.success:
+                raise _undetermined(model, linearise(model, result.x * scale).conversion_constant)
+            solution = result.x
+    except ValueError as error:  # residuals or slopes are not finite
+        raise _undetermined(model) from error
     # The model is even in the width.
     solution[1] = abs(solution[1])
     fit = linearise(model, solution * scale)

@@ -9,8 +9,8 @@ from scipy.stats import multivariate_normal
 
 import memscal
 from memscal.axisymmetry.hankel import Wavenumbers
-from memscal.estimation.bayesian import HYPOTHESES
-from memscal.estimation.departures import SHAPES
+from memscal.estimation.bayesian import HYPOTHESES, weigh_departures
+from memscal.estimation.departures import SHAPES, ReducedScan, departure_basis
 from memscal.estimation.profile import constrained_profile
 
 R = np.linspace(0.0, 3e-3, 121)
@@ -68,6 +68,16 @@ def test_posterior_odds_are_prior_odds_times_the_ratio_of_marginal_likelihoods()
         logs.append(density - np.log(size) + np.log(h.estimate))
     found = np.log(estimate.weighed.probability[likely])
     np.testing.assert_allclose(found - found.max(), logs - np.max(logs), atol=1e-6)
+
+
+def test_a_hypothesis_without_prior_is_left_out_however_well_it_fits():
+    estimate = estimated(simulated())
+    reduced = ReducedScan.of(estimate.model, estimate.gaussian, estimate.weights, None)
+    weighing = weigh_departures(reduced, departure_basis(estimate.gaussian, reduced), 65.0)
+    better = weighing.log_marginals + 1e4 * np.array([h.estimate == 0.0 for h in HYPOTHESES])
+    found = replace(weighing, log_marginals=better).average()
+    assert np.isfinite(found.residual).all()
+    np.testing.assert_allclose(found.probability, weighing.average().probability)
 
 
 def test_the_width_reached_by_fewer_points_than_components_keeps_the_prior():

@@ -92,6 +92,12 @@ def test_one_gross_outlier_does_not_lead_the_search_astray(place):
     assert fit(replace(scan, u_zz=u)).centre[0, 0] == pytest.approx(0.14e-3, abs=0.05e-3)
 
 
+def test_a_fit_that_leaves_all_numbers_is_refused():
+    model = forward(simulated(noise=0.0))
+    with pytest.raises(FitError, match="No Gaussian"):
+        fit_gaussian_to_points(model, np.full_like(model.points.u, np.nan), fit(simulated()))
+
+
 def test_a_voltage_that_never_falls_again_is_refused():
     scan = simulated()
     bowl = 1e-4 * (scan.x / 1e-3) ** 2
