@@ -127,10 +127,12 @@ def _time_step(properties: Mapping[str, Any]) -> float:
 
 def _require_one_clock(name: str, channels: Mapping[str, Any]) -> None:
     """Refuse channels that were not sampled together: their rows do not belong together."""
-    stated = {column: channel.properties.get(_TIME) for column, channel in channels.items()}
-    if len({*stated.values()} - {None}) > 1:
-        raise InputError(
-            f"{name}: {_TIME} differs between the channels: {stated}.",
-            why="A row is what was read at one time.",
-            cure="Name channels of one rate.",
-        )
+    steps = {column: channel.properties.get(_TIME) for column, channel in channels.items()}
+    lengths = {column: len(channel) for column, channel in channels.items()}
+    for what, stated in ((_TIME, steps), ("the number of values", lengths)):
+        if len({*stated.values()} - {None}) > 1:
+            raise InputError(
+                f"{name}: {what} differs between the channels: {stated}.",
+                why="A row is what was read at one time.",
+                cure="Name channels of one rate; get the file again if it may have been cut.",
+            )
