@@ -23,6 +23,8 @@ from memscal.model.sizes import MOST_PIXELS, too_large
 from memscal.model.stress import IDEAL, IdealReference, StressField, StressProfile
 
 _NAMED = re.compile(r"([A-Za-z]{3,})(?::(.*))?")
+#: A source whose name and size are separated in another way.
+_MISSPELT = re.compile(r"([A-Za-z]{3,})[\W_]*?([.,\d]+\s*[cmunµμ]?m)\W*")
 _LENGTH = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([A-Za-zµμ]+)\s*")
 #: Files of pixels, which state no size of theirs; weights of red, green and blue in the luminance.
 _PIXELS = (".npy", ".png", ".tif", ".tiff")
@@ -86,14 +88,17 @@ def read_reference(
 
 def ideal_reference(text: FilePath) -> IdealReference | None:
     """Return the ideal reference that a text names; nothing of a file that exists."""
-    match = _NAMED.fullmatch(os.fspath(text).strip())
+    given = os.fspath(text).strip()
+    named = _NAMED.fullmatch(given)
+    match = named or _MISSPELT.fullmatch(given)
     if match is None or os.path.exists(text):
         return None
     shape = match[1].lower()
     size = match[2]
-    if shape not in IDEAL:
+    if named is None or shape not in IDEAL:
+        example = f"{shape}:{size}" if shape in IDEAL else "disc:0.5mm"
         cure = (
-            "Sources are disc:R, slit:W and gaussian:S, each with a unit (disc:0.5mm), and point."
+            f"Sources are disc:R, slit:W and gaussian:S, each with a unit ({example}), and point."
         )
         raise InputError(f"{text} cannot be read: it is no file, and no source.", cure=cure)
     if shape == "point" and not size:

@@ -200,6 +200,7 @@ def test_what_is_no_field_is_refused(name):
         ("disc:1s", "length"),
         ("point:1mm", "no size"),
         ("disk:1mm", "cannot be read: it is no file, and no source"),
+        *((f"disc{wrong}", r"\(disc:1mm\)") for wrong in ("=1mm", " 1mm", "1mm", "(1mm)")),
         ("gaussian", "no length"),
         ("slit:0mm", "above zero"),
         ("disc:0,5mm", "decimal point"),
