@@ -142,6 +142,15 @@ NO_UNITS = {"x_unit": None, "u_unit": None}
         (f"x [mm],u [mV]\nmm,V\n{LINE}", NO_UNITS, "'mV' in its head, and 'V'"),
         ("x (um);u (mV)\n-6,000;1\n-750;2\n0;3\n1,000;5\n", NO_UNITS, "may separate thousands"),
         (f"x/mm,u (mV),u (V)\n{LINE}", NO_UNITS, r"columns 'u': u \(mV\), u \(V\)"),
+        *(
+            (f"x,u,{head}\n{LINE.replace(chr(10), f',{cell}{chr(10)}')}", given, f"says {cell}")
+            for head, cell, given in (
+                ("unit", "mV", {"u_unit": "V"}),
+                ("unit", "V", {}),
+                ("t", "uT", {"u_unit": "nT"}),
+                ("x_unit", "um", {}),
+            )
+        ),
     ],
 )
 def test_a_table_of_no_use_is_refused(text, options, words):

@@ -21,7 +21,7 @@ from memscal.formats.tables.dialect import (
     is_number,
     number_of,
 )
-from memscal.formats.units import is_unit, same_unit, to_si
+from memscal.formats.units import is_unit, reading_of, same_unit, to_si
 from memscal.model.arrays import Arrays, FloatArray
 from memscal.model.notation import printable
 from memscal.model.provenance import SourceFile
@@ -84,6 +84,8 @@ class NamedColumns:
         self._again = set[int]()
         # Columns not asked for, in whose cells other words are no readings.
         self._others: list[Wanted] = []
+        # Units that columns of units state in every row.
+        self._stated: list[str] = []
         self._missing = {*MISSING, *(word.strip().lower() for word in missing)}
         self._sentinels = [number_of(w.replace(",", ".")) for w in missing if is_number(w)]
         # Cells that are no numbers, by column: how many, and the first of them with their lines.
@@ -113,6 +115,8 @@ class NamedColumns:
                 column[count : count + len(lines)] = numbers
             count += len(lines)
         self._refuse_wrong(items)
+        for item in items:
+            self._refuse_other_unit(item)
         self._describe(count)
         return {
             name: to_si(values.pop(0)[:count], item.unit, item.dimension, self.where(item.column))
@@ -236,6 +240,10 @@ class NamedColumns:
         """Whether a column not asked for begins with numbers or a unit: no word may follow."""
         begun = [cell for cell in cells[: len(cells) // 2] if cell.lower() not in self._missing]
         units = {begun[0].lower(): 0.0} if begun and are_units(begun) else {}
+        # A letter alone may be a flag, and a unit another column's.
+        others = tuple(f"{other}_" for other in self.others.split(", "))
+        if (units or "unit" in name.lower()) and not name.startswith(others):
+            self._stated += filter(UNIT.fullmatch, begun[:1])
         numbers = [*itertools.dropwhile(lambda cell: not is_number(cell), begun)]
         # Words above whole numbers are a summary, as words below numbers are.
         usual = is_number if numbers == begun else str.isdigit
@@ -251,6 +259,18 @@ class NamedColumns:
             self._again.add(line)
         if len(cells) < _NAMED:
             cells.append(printable(cell, MAX_NAME))
+
+    def _refuse_other_unit(self, item: Wanted) -> None:
+        """Refuse a unit where a column of units of its kind states another."""
+        where = self.where(item.column)
+        unit = item.unit or "1"
+        stated = [u for u in self._stated if reading_of(u, where).si == reading_of(unit, where).si]
+        if stated and not any(same_unit(unit, one) for one in stated):
+            raise InputError(
+                f"{where} is in {unit}, but a column of units says {stated[0]}.",
+                why="One of them is wrong.",
+                cure="State the unit of the table, or leave its column of units out.",
+            )
 
     def _refuse_wrong(self, wanted: list[Wanted]) -> None:
         if self._again:
