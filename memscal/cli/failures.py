@@ -110,49 +110,39 @@ def guarded(run: Callable[[Session], int]) -> int:
         except click.UsageError as failure:
             failure.show()
             return USAGE
-        except (click.Abort, KeyboardInterrupt) as failure:
-            _traceback(session)
-            if isinstance(failure.__cause__, EOFError):
-                return _internal(failure.__cause__)
+        except (Exception, KeyboardInterrupt) as failure:  # noqa: BLE001 - the last resort
+            if session.debug:
+                import traceback
+
+                click.echo(traceback.format_exc(), file=sys.stderr, nl=False)
+            return _reported(failure, came)
+
+
+def _reported(failure: BaseException, came: Sequence[int]) -> int:
+    """Say what a failure was; return its exit code."""
+    if isinstance(failure, click.Abort | KeyboardInterrupt):
+        if not isinstance(failure.__cause__, EOFError):
             message("Interrupted. Nothing was left half-written.")
             return 128 + came[0] if came else INTERRUPTED
-        except MemscalError as failure:
-            _traceback(session)
-            error(failure.problem, failure.why, failure.cure)
-            return failure.exit_code
-        except OSError as failure:
-            _traceback(session)
-            if failure.filename is not None or failure.errno not in _UNPRINTED:
-                return _internal(failure)
-            # click printed a help text; a reader that goes away is no failure.
-            refusal = unprinted(failure)
-            if failure.errno == errno.EPIPE:
-                return DONE
-            error(refusal.problem, refusal.why, refusal.cure)
-            return refusal.exit_code
-        except MemoryError:
-            _traceback(session)
-            cure = "Close other programs, or give a scan with fewer points."
-            error("The computer ran out of memory.", cure=cure)
-            return INTERNAL
-        except Exception as failure:  # noqa: BLE001 - the last resort, and reported as such
-            _traceback(session)
-            return _internal(failure)
-
-
-def _internal(failure: BaseException) -> int:
+        failure = failure.__cause__
+    if isinstance(failure, OSError) and failure.filename is None and failure.errno in _UNPRINTED:
+        # click printed a help text; a reader that goes away is no failure.
+        away = failure.errno == errno.EPIPE
+        failure = unprinted(failure)
+        if away:
+            return DONE
+    if isinstance(failure, MemscalError):
+        error(failure.problem, failure.why, failure.cure)
+        return failure.exit_code
+    if isinstance(failure, MemoryError):
+        cure = "Close other programs, or give a scan with fewer points."
+        error("The computer ran out of memory.", cure=cure)
+        return INTERNAL
     text = " ".join(str(failure).split())
     fault = type(failure).__name__ + (f" ({text})" if text else "")
     cure = "Please report it, with what `memscal --debug` and the same arguments print."
     error(f"memscal failed by a fault of its own, not of its input: {fault}.", cure=cure)
     return INTERNAL
-
-
-def _traceback(session: Session) -> None:
-    if session.debug:
-        import traceback
-
-        click.echo(traceback.format_exc(), file=sys.stderr, nl=False)
 
 
 def _show_warning(message: Warning | str, category: type[Warning], *_: Any, **__: Any) -> None:
