@@ -2,7 +2,7 @@
 
 import click
 
-from memscal.cli.failures import DONE, debug_option
+from memscal.cli.failures import debug_option
 from memscal.cli.output import emit
 
 EXAMPLES = """\b
@@ -16,7 +16,7 @@ Examples:
 @click.command("completion", epilog=EXAMPLES)
 @click.argument("shell", type=click.Choice(["bash", "zsh", "fish"]))
 @debug_option
-def command(shell: str) -> int:
+def command(shell: str) -> None:
     """Print the script with which SHELL completes commands, options and file names."""
     from click.shell_completion import get_completion_class
 
@@ -27,4 +27,3 @@ def command(shell: str) -> int:
     script = kind(memscal, {}, "memscal", "_MEMSCAL_COMPLETE")
     # Not .source(): for bash it would look for a shell on this machine before it answers.
     emit(script.source_template % script.source_vars())
-    return DONE

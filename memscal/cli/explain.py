@@ -4,7 +4,7 @@ import re
 
 import click
 
-from memscal.cli.failures import DONE, debug_option
+from memscal.cli.failures import debug_option
 from memscal.cli.options import json_option
 from memscal.cli.output import emit_json, emit_tables
 from memscal.summaries.table import Table
@@ -21,7 +21,7 @@ Examples:
 @click.argument("check", required=False)
 @json_option
 @debug_option
-def command(check: str | None, as_json: bool) -> int:
+def command(check: str | None, as_json: bool) -> None:
     """Explain a quality CHECK: what it tests, and what to do if it fails; without one, list all.
 
     Names are those of the tables, with blanks or underscores; a profile's number makes no
@@ -43,7 +43,6 @@ def command(check: str | None, as_json: bool) -> int:
         tests, cure = EXPLANATIONS[names[0]]
         rows = [("what it tests", tests), ("if it fails", cure)]
         emit_tables(Table(names[0].replace("_", " "), ("", ""), rows))
-    return DONE
 
 
 def _kind(check: str) -> str:

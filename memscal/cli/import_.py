@@ -10,7 +10,6 @@ import click
 
 from memscal.cli import options as common
 from memscal.cli import output as out
-from memscal.cli.failures import DONE
 from memscal.cli.options import FILE, NonNegative, Quantity, option, output_options, si
 from memscal.extensions import hook
 from memscal.formats.files import together
@@ -314,7 +313,7 @@ _NEEDED_WITH_MESH = ("r_unit", "sigma_unit")
 @output_options
 def command(
     table: Path, output: Path, kind: str, as_json: bool, force: bool, **options: Any
-) -> int:
+) -> None:
     """Convert a TABLE or a mesh (VTU, VTK, XDMF) to a scan or a reference.
 
     Tables are text (CSV, SPEC), .xlsx, Parquet, HDF5 (its columns are paths) and TDMS.
@@ -357,7 +356,6 @@ def command(
             out.emit(readable("\n".join(note.text for note in notes if note not in warnings)))
     out.show_messages(warnings)
     out.say_written([output])
-    return DONE
 
 
 def _check_usage(path: Path, kind: str, mesh: bool, options: common.Options) -> None:

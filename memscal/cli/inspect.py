@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from memscal.cli.failures import DONE, debug_option
+from memscal.cli.failures import debug_option
 from memscal.cli.options import FILE, accept_altered_option, json_option
 from memscal.cli.output import emit_json, emit_tables
 from memscal.model.notation import format_measured
@@ -27,7 +27,7 @@ Examples:
 @accept_altered_option
 @json_option
 @debug_option
-def command(file: Path, accept_altered: bool, as_json: bool) -> int:
+def command(file: Path, accept_altered: bool, as_json: bool) -> None:
     """Show what a scan, a reference, an artifact or a file of measured stress holds.
 
     Quantities with their standard uncertainties, arrays with shape and range, quality checks, and
@@ -41,7 +41,6 @@ def command(file: Path, accept_altered: bool, as_json: bool) -> int:
         emit_json(contents)
     else:
         emit_tables(*_tables(contents))
-    return DONE
 
 
 def _tables(contents: Item) -> Iterator[Table]:

@@ -10,7 +10,6 @@ import click
 
 from memscal.cli import options as common
 from memscal.cli import output as out
-from memscal.cli.failures import DONE
 from memscal.cli.options import (
     FILE,
     PAPER_FILM,
@@ -160,7 +159,7 @@ Examples:
     "and one load or depth."
 )
 @common.output_options
-def command(indenter: str, as_json: bool, force: bool, **options: Any) -> int:
+def command(indenter: str, as_json: bool, force: bool, **options: Any) -> None:
     """Press a rigid INDENTER on a bonded film: load, depth, contact, and stress at the base.
 
     Defaults are the paper's: a film of E = 2.2 MPa, Poisson's ratio 0.5 and thickness 2 mm; a
@@ -175,7 +174,6 @@ def command(indenter: str, as_json: bool, force: bool, **options: Any) -> int:
         messages = _print(contacts, options, as_json=as_json)
     out.show_messages(messages)
     out.say_written(files)
-    return DONE
 
 
 def _check_usage(options: common.Options) -> None:
