@@ -152,7 +152,7 @@ def command(
 
     from memscal.apparatus import load_apparatus
     from memscal.cli.failures import exit_code_of
-    from memscal.formats.opened_contacts import opened_contacts
+    from memscal.formats.opened import opened_contacts
     from memscal.formats.reference import read_reference
     from memscal.friction.compare import compare, scans_of
     from memscal.summaries.comparison import file_json, notes

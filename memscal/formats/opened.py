@@ -1,4 +1,4 @@
-"""Scans, given as objects or as the paths of their files."""
+"""Scans, and the stress measured of them, given as objects or as the paths of their files."""
 
 from collections.abc import Hashable, Iterable, Sequence
 from os import PathLike
@@ -7,11 +7,17 @@ from typing import Any, TypeAlias
 from memscal.errors import InputError
 from memscal.formats.files import FilePath
 from memscal.formats.hdf5.reader import open_hdf5
+from memscal.formats.hdf5.writer import SCHEMA_ATTRIBUTE, STRESS_SCHEMA
 from memscal.formats.scan import scan_from
+from memscal.formats.stress import stress_from
+from memscal.model.measured_stress import MeasuredStress
 from memscal.model.scan import Scan
 
 Scans: TypeAlias = Scan | FilePath | Sequence[Scan | FilePath]
 """One scan or several, each itself or as the path of its file."""
+
+Contacts: TypeAlias = Scan | MeasuredStress | FilePath | Sequence[Scan | MeasuredStress | FilePath]
+"""Scans, or the stress that was measured of them; each itself or as the path of its file."""
 
 
 def opened_scan(scan: Any, most: int | None = None, *, accept_altered: bool = False) -> Scan:
@@ -35,6 +41,25 @@ def opened_scans(
     opened = [opened_scan(scan, most, accept_altered=accept_altered) for scan in listed]
     if len(opened) > 1:
         require_different(map(contents_of, opened))
+    return tuple(opened)
+
+
+def opened_contacts(
+    contacts: Contacts, *, accept_altered: bool = False
+) -> tuple[Scan | MeasuredStress, ...]:
+    """Return scans and measured stresses that are given themselves or as paths, at least one."""
+    opened: list[Scan | MeasuredStress] = []
+    for item in listed_items(contacts):
+        if isinstance(item, MeasuredStress):
+            opened.append(item)
+        elif isinstance(item, str | PathLike):
+            with open_hdf5(item, accept_altered=accept_altered) as file:
+                is_stress = file.attribute("/", SCHEMA_ATTRIBUTE) == STRESS_SCHEMA
+                opened.append(stress_from(file) if is_stress else scan_from(file))
+        else:
+            opened.append(opened_scan(item))
+    if len(opened) > 1:
+        require_different(contents_of(item) for item in opened if isinstance(item, Scan))
     return tuple(opened)
 
 

@@ -13,7 +13,7 @@ from memscal.estimation.points import measured_mask
 from memscal.estimation.set_up import accepted_differences
 from memscal.extensions import hook
 from memscal.formats.cache import CacheFolder
-from memscal.formats.opened_contacts import Contacts, opened_contacts
+from memscal.formats.opened import Contacts, opened_contacts
 from memscal.friction.calculated import FRICTIONS, amontons_family, external_family
 from memscal.friction.checks import comparison_checks, comparison_messages, synthetic_messages
 from memscal.friction.dry_against_lubricated import dry_against_lubricated, lubricated_pairs
