@@ -154,12 +154,11 @@ class NamedColumns:
 
     def lines(self, rows: Sequence[int]) -> str:
         """Name the lines of the file in which rows stand: the first five, and how many more."""
-        return self._named(self.all_lines()[rows[:_NAMED]].tolist(), len(rows))
+        return self._named(self.all_lines()[rows])
 
-    def _named(self, lines: Sequence[int], count: int) -> str:
-        more = f" and {count - _NAMED} more" if count > _NAMED else ""
-        several = "s" if count > 1 else ""
-        return f"{self._row}{several} {', '.join(map(str, lines[:_NAMED]))}{more}"
+    def _named(self, lines: Lines) -> str:
+        several = "s" if len(lines) > 1 else ""
+        return f"{self._row}{several} {', '.join(map(str, lines[:_NAMED]))}{_more(lines)}"
 
     def all_lines(self) -> NDArray[Any]:
         """Return the line of the file of each row, (n,)."""
@@ -274,7 +273,7 @@ class NamedColumns:
 
     def _refuse_wrong(self, wanted: list[Wanted]) -> None:
         if self._again:
-            again = self._named(sorted(self._again), len(self._again))
+            again = self._named(sorted(self._again))
             problem = f"{self._name}: the head of the table stands again in {again}."
             raise FormatError(
                 problem, why="Another table begins there.", cure="Give each a file of its own."
@@ -287,13 +286,17 @@ class NamedColumns:
             if not lines or (watched and {*self.all_lines()[[0, -1]]}.isdisjoint(lines)):
                 continue
             named = ", ".join(f"{i} ({cell!r})" for i, cell in zip(lines, cells, strict=False))
-            more = f" and {len(lines) - _NAMED} more" if len(lines) > _NAMED else ""
             why = next((text for test, text in _CAUSES if any(map(test, cells))), "")
             raise FormatError(
                 f"{self.where(item.column)} holds what is not "
-                f"{' or '.join(['a number', *item.words])} in {self._row} {named}{more}.",
+                f"{' or '.join(['a number', *item.words])} in {self._row} {named}{_more(lines)}.",
                 why=why,
                 cure="Correct or remove these lines; name a word that means a missing value "
                 "(--missing WORD); state the decimal mark (--decimal); or state how many lines "
                 "stand before the header (--skip-rows N).",
             )
+
+
+def _more(lines: Lines) -> str:
+    """Say how many lines there are beyond those that are named."""
+    return f" and {len(lines) - _NAMED} more" if len(lines) > _NAMED else ""

@@ -162,8 +162,7 @@ class TextTable(NamedColumns):
         heads = [*names, *[""] * (self._width - len(names))]
         self.names = tuple(printable(c, MAX_NAME) or str(i + 1) for i, c in enumerate(heads))
         self._first = rows[start:], places[start:]
-        by_rows = not names or self._delimiter == " "
-        self._columns = width if by_rows else len(names)
+        self._columns = len(names) or width
         self._named_columns = last_name(names)
         after = places[start - 1] if start else 0
         self._require_whole(*self._first, [entry for entry in lines if entry[0] > after])
@@ -211,14 +210,12 @@ class TextTable(NamedColumns):
         if self._headed and (units or any(map(CELLS.match, self._said))):
             notes.append(f"The header is {self._row} {self._header}{units}.")
         if self._comments:
-            notes.append(
-                f"Left out as comments: {self._named(self._comments, len(self._comments))}."
-            )
+            notes.append(f"Left out as comments: {self._named(self._comments)}.")
         if self._sheet:
             apart = f"of the sheet {self._sheet.name!r}"
             hidden = self._sheet.hidden
             if hidden:
-                notes.append(f"Hidden, and read as all others: {self._named(hidden, len(hidden))}.")
+                notes.append(f"Hidden, and read as all others: {self._named(hidden)}.")
         else:
             mark = "comma" if self.decimal == "," else "point"
             delimiter = DELIMITERS.get(self._delimiter, repr(self._delimiter))
@@ -247,18 +244,16 @@ class TextTable(NamedColumns):
                 cure="Take quotation marks out of the rows of numbers, or close them.",
             )
         stated = self._columns
-        for row in rows:  # an empty last cell is none: rows may end in a delimiter
+        by_blanks = self._delimiter == " "
+        for row, place in zip(rows, places, strict=True):
+            # An empty last cell is none: rows may end in a delimiter.
             self._reach = max(self._reach, len(row) - (not row[-1].strip()))
-        if self._delimiter == " ":
-            wrong = (i for i, row in enumerate(rows) if len(row) != stated)
-            by = "first row"
-        else:  # cells may be missing at the end
-            wrong = (i for i, row in enumerate(rows) if any(map(str.strip, row[stated:])))
+            # Between delimiters cells may be missing at the end.
+            if not any(map(str.strip, row[stated:])) and not (by_blanks and len(row) < stated):
+                continue
             by = "header" if self._headed else "first row"
-        for i in wrong:
             raise FormatError(
-                f"{self._name}: {self._row} {places[i]} has {len(rows[i])} cells, the {by} "
-                f"{stated}.",
+                f"{self._name}: {self._row} {place} has {len(row)} cells, the {by} {stated}.",
                 why="Which cell belongs to which column is not known, or another table begins.",
                 cure="Correct the table, or give each a file of its own; state what separates its "
                 "cells (--delimiter), or write numbers with a decimal point where commas separate "
