@@ -6,12 +6,12 @@ import numpy as np
 
 from memscal.errors import FormatError
 from memscal.formats import groups
+from memscal.formats.digest import require_schema, require_unaltered
 from memscal.formats.files import FilePath
 from memscal.formats.groups import read_record, write_record
 from memscal.formats.hdf5.reader import SafeFile
 from memscal.formats.hdf5.writer import ARTIFACT_SCHEMA, Group, file_tree, si, to_json, write_tree
 from memscal.formats.units import reading_of
-from memscal.formats.values import require_schema, require_unaltered, text_list, units_of
 from memscal.model import apparatus, records
 from memscal.model.apparatus import ApparatusData, ApparatusField, ApparatusRadial
 from memscal.model.arrays import Arrays
@@ -30,7 +30,7 @@ def artifact_from(file: SafeFile) -> ApparatusData:
     film, indenter = groups.read_stated(file)
     process = groups.read_process(file)
     u_zz = "/entry/reconvolution/u_zz"
-    reading = reading_of(units_of(file, u_zz) or "V", file.where(u_zz))
+    reading = reading_of(file.units_of(u_zz) or "V", file.where(u_zz))
     reading = replace(reading, per=str(process.configuration.get("reference_unit", "Pa")))
     plane = None
     if file.has(_PLANE):
@@ -111,7 +111,7 @@ def artifact_tree(data: ApparatusData) -> Group:
 def _read_changes(file: SafeFile) -> Arrays:
     if not file.has(f"{_CHANGES}/names"):
         return {}
-    names = text_list(file, f"{_CHANGES}/names")
+    names = file.text_list(f"{_CHANGES}/names")
     sizes = {"input": len(names), "r": file.array("/entry/radial_profile/r").size}
     read = read_record(records.KERNEL_CHANGES, file, _CHANGES, sizes=sizes)["kernel_changes"]
     return dict(zip(names, read, strict=True))

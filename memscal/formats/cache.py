@@ -14,10 +14,10 @@ from pathlib import Path
 from typing import Any
 
 from memscal.errors import MemscalError, OutputError
+from memscal.formats.digest import require_schema, require_unaltered
 from memscal.formats.files import FilePath, atomic_write_bytes
 from memscal.formats.hdf5.reader import open_hdf5
 from memscal.formats.hdf5.writer import Group, Nodes, Number, file_tree, tree_to_bytes
-from memscal.formats.values import require_schema, require_unaltered
 from memscal.model.arrays import Arrays
 
 CONTACT_TABLE_SCHEMA = "memscal-contact-table"

@@ -14,15 +14,6 @@ from memscal.formats.hdf5 import writer
 from memscal.formats.hdf5.reader import SafeFile
 from memscal.formats.hdf5.writer import Attribute, Group, Node, Nodes, Number, si, to_json
 from memscal.formats.units import dimension_of, from_si, to_si
-from memscal.formats.values import (
-    any_scalar,
-    json_value,
-    require_array,
-    require_scalar,
-    require_text,
-    text_list,
-    units_of,
-)
 from memscal.model import records
 from memscal.model.apparatus import ApparatusData, ParameterSet
 from memscal.model.arrays import Values
@@ -63,24 +54,24 @@ def write_source(source: SourceFile) -> Group:
 
 def read_source(file: SafeFile, path: str) -> SourceFile:
     """Read the name and the checksum of a file that was read."""
-    name = require_text(file, f"{path}/file_name")
-    return SourceFile(name, require_text(file, f"{path}/checksum"))
+    name = file.text(f"{path}/file_name")
+    return SourceFile(name, file.text(f"{path}/checksum"))
 
 
 KINDS = {
-    "text": Kind(lambda _, text: str(text), require_text),
-    "note": Kind(lambda _, text: writer.note(text), require_text, inside="/data"),
+    "text": Kind(lambda _, text: str(text), SafeFile.text),
+    "note": Kind(lambda _, text: writer.note(text), SafeFile.text, inside="/data"),
     "truth": Kind(
         lambda _, truth: writer.count(truth),
-        lambda file, path: bool(require_scalar(file, path, "dimensionless")),
+        lambda file, path: bool(file.require_scalar(path, "dimensionless")),
         always=True,
     ),
     "mapping": Kind(
-        _write_json_note, lambda file, path: json_value(file, path, dict, {}), True, "/data"
+        _write_json_note, lambda file, path: file.json_value(path, dict, {}), True, "/data"
     ),
     "messages": Kind(
         lambda quantity, messages: _write_json_note(quantity, [*map(asdict, messages)]),
-        lambda file, path: messages_from_json(json_value(file, path, list, [])),
+        lambda file, path: messages_from_json(file.json_value(path, list, [])),
         True,
         "/data",
     ),
@@ -148,8 +139,8 @@ def _read(file: SafeFile, at: str, quantity: Quantity, lengths: dict[str, int]) 
     if kind is not None:
         return kind.read(file, at)
     if not quantity.axes:
-        return require_scalar(file, at, quantity.dimension)
-    values = require_array(file, at, quantity.dimension, ndim=len(quantity.axes))
+        return file.require_scalar(at, quantity.dimension)
+    values = file.require_array(at, quantity.dimension, ndim=len(quantity.axes))
     axes = [axis.removesuffix("_prime") for axis in quantity.axes]
     shape = tuple(map(lengths.setdefault, axes, values.shape))
     if values.shape != shape:
@@ -229,7 +220,7 @@ def parameter_group(parameters: ParameterSet, budget: Mapping[str, Mapping[str, 
 
 def read_parameters(file: SafeFile, path: str, reading: Reading) -> ParameterSet:
     """Read the parameters, in SI units."""
-    names = tuple(text_list(file, f"{path}/names"))
+    names = tuple(file.text_list(f"{path}/names"))
     if not names or len(set(names)) != len(names):
         raise FormatError(
             f"{file.where(path)}/names is missing or names a parameter twice.",
@@ -241,13 +232,13 @@ def read_parameters(file: SafeFile, path: str, reading: Reading) -> ParameterSet
     for name in names:
         estimated_quantity(name).read_in(reading)  # enters its unit
         at = f"{path}/{name}"
-        value, si_unit = any_scalar(file, at)
+        value, si_unit = file.any_scalar(at)
         values.append(value)
         units.append(si_unit)
-        stored = units_of(file, at) or "1"
+        stored = file.units_of(at) or "1"
         where = file.where(at)
         scales.append(to_si(1.0, stored, dimension_of(stored, where), where))
-    covariance = require_array(file, f"{path}/covariance", "dimensionless", ndim=2)
+    covariance = file.require_array(f"{path}/covariance", "dimensionless", ndim=2)
     if covariance.shape != (len(names), len(names)):
         raise FormatError(
             f"{file.where(path)}/covariance has shape {covariance.shape} for {len(names)} names."
@@ -265,7 +256,7 @@ def read_parameters(file: SafeFile, path: str, reading: Reading) -> ParameterSet
 def estimated_record(file: SafeFile) -> Record:
     """Return what the group of the parameters holds, by the names that the file gives them."""
     return Record(
-        "NXcollection", tuple(map(estimated_quantity, text_list(file, "/entry/parameters/names")))
+        "NXcollection", tuple(map(estimated_quantity, file.text_list("/entry/parameters/names")))
     )
 
 
@@ -287,10 +278,10 @@ def budget_group(budget: Mapping[str, Mapping[str, float]], dimensions: Mapping[
 def read_budget(file: SafeFile, path: str) -> dict[str, dict[str, float]]:
     """Read the uncertainty budget, in SI units; empty where there is none."""
     budget = {}
-    for quantity in text_list(file, f"{path}/names"):
+    for quantity in file.text_list(f"{path}/names"):
         group = f"{path}/{quantity}"
-        sources = text_list(file, f"{group}/names")
-        budget[quantity] = {name: any_scalar(file, f"{group}/{name}")[0] for name in sources}
+        sources = file.text_list(f"{group}/names")
+        budget[quantity] = {name: file.any_scalar(f"{group}/{name}")[0] for name in sources}
     return budget
 
 
@@ -367,7 +358,7 @@ def read_round_indenter(file: SafeFile, path: str) -> RoundIndenter:
 
 
 def _shape(file: SafeFile, path: str) -> str:
-    return require_text(file, f"{path}/shape").strip().lower()
+    return file.text(f"{path}/shape").strip().lower()
 
 
 def instrument_group(
@@ -444,7 +435,7 @@ def read_field(file: SafeFile, path: str) -> StressField:
     y, x = axes if isinstance(axes, tuple) and len(axes) == 2 else ("y", "x")
     signal = (file.attribute(path, "signal") if path else None) or "sigma_zz"
     at = f"{path}/{signal}"
-    unit = units_of(file, at) or "1"
+    unit = file.units_of(at) or "1"
     if not file.has(at):
         raise FormatError(
             f"{file.where(at)} is missing.",
@@ -454,9 +445,9 @@ def read_field(file: SafeFile, path: str) -> StressField:
     with suppress(UnitError):
         values = to_si(values, unit, "stress", file.where(at))
         unit = "Pa"
-    load = require_scalar(file, f"{path}/load", "force") if file.has(f"{path}/load") else None
-    along_x = require_array(file, f"{path}/{x}", "length", ndim=1)
-    along_y = require_array(file, f"{path}/{y}", "length", ndim=1)
+    load = file.require_scalar(f"{path}/load", "force") if file.has(f"{path}/load") else None
+    along_x = file.require_array(f"{path}/{x}", "length", ndim=1)
+    along_y = file.require_array(f"{path}/{y}", "length", ndim=1)
     with placed(file.where(path or "/")):
         return StressField(
             x=along_x, y=along_y, values=values, unit=unit, load=load, source=file.source
@@ -517,7 +508,7 @@ def read_assumptions(file: SafeFile) -> tuple[Assumption, ...]:
     """Read what was taken for granted, where a file states it."""
     path = "/entry/assumptions"
     assumptions = []
-    for name in text_list(file, f"{path}/names"):
+    for name in file.text_list(f"{path}/names"):
         declared = records.assumption_record(is_length=Assumption(name, "").is_length)
         sizes = read_record(declared, file, f"{path}/{name}")
         assumptions.append(Assumption(name, sizes.pop("state"), sizes))
@@ -538,7 +529,7 @@ def quality_group(checks: tuple[QualityCheck, ...]) -> Group:
 def read_quality(file: SafeFile) -> tuple[QualityCheck, ...]:
     """Read the quality checks, in their order."""
     checks = []
-    for name in text_list(file, "/entry/quality/names"):
+    for name in file.text_list("/entry/quality/names"):
         defaults = {"name": name, "meaning": ""}
         stated = read_record(records.CHECK, file, f"/entry/quality/{name}", defaults=defaults)
         checks.append(QualityCheck(**stated))

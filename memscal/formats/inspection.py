@@ -8,6 +8,7 @@ import numpy as np
 
 from memscal.errors import FormatError, MemscalError
 from memscal.formats.artifact import artifact_from
+from memscal.formats.digest import altered, has_no_digest, require_schema
 from memscal.formats.files import FilePath
 from memscal.formats.groups import estimated_record, listed, origins, read_quality
 from memscal.formats.hdf5 import writer
@@ -16,14 +17,6 @@ from memscal.formats.reference import profile_from
 from memscal.formats.scan import scan_from
 from memscal.formats.stress import profile_paths, stress_from
 from memscal.formats.units import dimension_of, to_si
-from memscal.formats.values import (
-    altered,
-    has_no_digest,
-    only_number,
-    optional_text,
-    require_schema,
-    units_of,
-)
 from memscal.model import records
 from memscal.model.arrays import Values
 from memscal.model.quantities import Record, record
@@ -106,7 +99,7 @@ def describe(path: FilePath, *, accept_altered: bool = False) -> Values:
             content["altered"] = file.source.altered
         content["schema"] = schema
         content["schema_version"] = version
-        content["title"] = optional_text(file, "/entry/title")
+        content["title"] = file.optional_text("/entry/title")
         quantities = []
         arrays = []
         provenance = []
@@ -195,10 +188,10 @@ def _quantity_row(file: SafeFile, path: str) -> Values:
     if file.is_text(path):
         row["value"] = file.text(path)
     else:
-        number = only_number(file, path, file.array(path))
+        number = file.only_number(path, file.array(path))
         row["value"] = "inf" if number == np.inf else _plain(number)
     row["standard_uncertainty"] = _uncertainty(file, path)
-    row["unit"] = None if file.is_text(path) else units_of(file, path) or "1"
+    row["unit"] = None if file.is_text(path) else file.units_of(path) or "1"
     return row
 
 
@@ -207,9 +200,9 @@ def _uncertainty(file: SafeFile, path: str) -> float | int | None:
     errors = f"{path}_errors"
     if not file.has(errors):
         return None
-    spread = only_number(file, errors, file.array(errors))
-    unit = units_of(file, path)
-    spread_unit = units_of(file, errors)
+    spread = file.only_number(errors, file.array(errors))
+    unit = file.units_of(path)
+    spread_unit = file.units_of(errors)
     if spread_unit != unit:
         dimension = dimension_of(unit or "1", file.where(path))
         scale = to_si(1.0, unit, dimension, file.where(path))
@@ -223,7 +216,7 @@ def _array_row(file: SafeFile, path: str) -> Values:
     return {
         "path": path,
         "shape": list(values.shape),
-        "unit": units_of(file, path) or "1",
+        "unit": file.units_of(path) or "1",
         "minimum": _plain(finite.min()) if finite.size else None,
         "maximum": _plain(finite.max()) if finite.size else None,
         "missing": int(np.isnan(values).sum()),

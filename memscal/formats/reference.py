@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from memscal.errors import InputError, placed
+from memscal.formats.digest import require_schema, require_unaltered
 from memscal.formats.files import FilePath, damage_named, read_bytes
 from memscal.formats.groups import profile_groups, read_field, read_profile
 from memscal.formats.hdf5 import writer
 from memscal.formats.hdf5.reader import SafeFile, open_hdf5
 from memscal.formats.hdf5.writer import REFERENCE_SCHEMA, Group, file_tree, write_tree
 from memscal.formats.units import to_si
-from memscal.formats.values import require_schema, require_unaltered
 from memscal.model.arrays import require_positive
 from memscal.model.provenance import SourceFile
 from memscal.model.sizes import MOST_PIXELS, too_large

@@ -4,14 +4,14 @@ import re
 from collections.abc import Iterator, Mapping
 
 from memscal.errors import FormatError, placed
-from memscal.formats import groups, values
+from memscal.formats import groups
+from memscal.formats.digest import require_schema, require_unaltered
 from memscal.formats.files import FilePath
 from memscal.formats.groups import read_record, write_record
 from memscal.formats.hdf5 import writer
 from memscal.formats.hdf5.reader import SafeFile, open_hdf5
 from memscal.formats.hdf5.writer import Group, Nodes, si
 from memscal.formats.units import reading_of
-from memscal.formats.values import any_scalar, optional_text, text_list, units_of
 from memscal.model import records
 from memscal.model.arrays import FloatArray, Values
 from memscal.model.notation import Reading
@@ -78,18 +78,18 @@ def read_scan(path: FilePath, *, accept_altered: bool = False) -> Scan:
 
 def scan_from(file: SafeFile, most: int | None = None) -> Scan:
     """Read the scan of an open memscal-scan file; one of more than ``most`` points is refused."""
-    values.require_schema(file, writer.SCAN_SCHEMA)
+    require_schema(file, writer.SCAN_SCHEMA)
     if most is not None:
         size = file.claimed_number(_SIGNAL)
         if size > most:
             cure = "Average neighbouring readings, thin the raster, or leave out repeats."
             raise too_large(file.name, size, most, "points", cure=cure)
-    values.require_unaltered(file, writer.SCAN_SCHEMA)
+    require_unaltered(file, writer.SCAN_SCHEMA)
     load = read_record(records.LOAD, file, "/entry/indenter", defaults={"load": None})
     with placed(file.where("/entry/indenter/friction_coefficient")):
         require_rod_friction(load.get("rod_friction"))
     film, indenter = groups.read_stated(file)
-    reading = reading_of(units_of(file, _SIGNAL) or "V", file.where(_SIGNAL))
+    reading = reading_of(file.units_of(_SIGNAL) or "V", file.where(_SIGNAL))
     axes = _find_axes(file)
     points = axes == _POINTS
     only_y = axes is not None and not file.has(f"{_DATA}/x")
@@ -120,8 +120,8 @@ def scan_from(file: SafeFile, most: int | None = None) -> Scan:
         unit=reading.si,
         **contact,
         **groups.read_circumstances(file),
-        title=optional_text(file, "/entry/title"),
-        notes=optional_text(file, "/entry/notes/data"),
+        title=file.optional_text("/entry/title"),
+        notes=file.optional_text("/entry/notes/data"),
         reference=reference,
         synthetic=_read_synthetic(file),
         source=file.source,
@@ -137,7 +137,7 @@ def _read_arrays(file: SafeFile, along: str, reading: Reading) -> Values:
         if name not in unused and (file.has(path) or name in (along, "u_zz")):
             ndim = len(quantity.axes) if name in _OWN_SHAPE else None
             dimension = quantity.read_in(reading).dimension
-            arrays[name] = values.require_array(file, path, dimension, ndim=ndim)
+            arrays[name] = file.require_array(path, dimension, ndim=ndim)
     ceiling = arrays.pop("reading_high", None)
     if ceiling is not None:
         arrays["u_zz"], number = without_clipped(arrays["u_zz"], ceiling)
@@ -295,7 +295,7 @@ def _read_synthetic(file: SafeFile) -> Values | None:
     if not file.is_group(path):
         return None
     truth = {}
-    for name in text_list(file, f"{path}/names"):
+    for name in file.text_list(f"{path}/names"):
         item = f"{path}/{name}"
-        truth[name] = file.text(item) if file.is_text(item) else any_scalar(file, item)[0]
+        truth[name] = file.text(item) if file.is_text(item) else file.any_scalar(item)[0]
     return truth

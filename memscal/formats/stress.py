@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 
 from memscal.errors import FormatError
-from memscal.formats import groups, values
+from memscal.formats import groups
+from memscal.formats.digest import require_schema, require_unaltered
 from memscal.formats.files import FilePath
 from memscal.formats.groups import read_record, read_source, write_record, write_source
 from memscal.formats.hdf5 import writer
 from memscal.formats.hdf5.reader import SafeFile, open_hdf5
 from memscal.formats.hdf5.writer import Group, Nodes, si, to_json
-from memscal.formats.values import json_value, optional_text, text_list
 from memscal.model import records
 from memscal.model.arrays import Arrays, FloatArray
 from memscal.model.checks import override_messages
@@ -47,7 +47,7 @@ def _read_scans(
     file: SafeFile, paths: Sequence[str], of: Sequence[int], sources: Mapping[str, SourceFile]
 ) -> tuple[MeasuredScan, ...]:
     """Read the scans; ``of`` says which, from 1, the profile at each of the paths is of."""
-    stored = json_value(file, "/entry/scans/names", list, None)
+    stored = file.json_value("/entry/scans/names", list, None)
     size = max(of) if stored is None else len(stored)
     if max(of) > size:
         raise FormatError(
@@ -59,14 +59,14 @@ def _read_scans(
         path = f"/entry/scans/{name}"
         source = sources.get(str(name))
         if stored is not None:
-            lubrication = optional_text(file, f"{path}/sample/lubrication")
+            lubrication = file.optional_text(f"{path}/sample/lubrication")
             numbers = read_record(records.MEASURED_SCAN, file, path)
         else:
             # A file of version 1.0 states film, indenter and sensor once, for all scans.
             path = "/entry"
             profile = paths[of.index(i) if i in of else 0]
-            lubrication = optional_text(file, f"{profile}/lubrication")
-            x, y = (values.require_array(file, f"{profile}/{axis}", "length") for axis in "xy")
+            lubrication = file.optional_text(f"{profile}/lubrication")
+            x, y = (file.require_array(f"{profile}/{axis}", "length") for axis in "xy")
             numbers = {"width": float(np.hypot(np.ptp(x), np.ptp(y)))}
         scans.append(
             MeasuredScan(
@@ -124,15 +124,15 @@ def read_stress(path: FilePath, *, accept_altered: bool = False) -> MeasuredStre
 
 def stress_from(file: SafeFile) -> MeasuredStress:
     """Read the measured stress of an open memscal-stress file."""
-    values.require_schema(file, writer.STRESS_SCHEMA)
-    values.require_unaltered(file, writer.STRESS_SCHEMA)
+    require_schema(file, writer.STRESS_SCHEMA)
+    require_unaltered(file, writer.STRESS_SCHEMA)
     paths = profile_paths(file)
     if not paths:
         raise FormatError(
             f"{file.where('/entry/profiles')} names no profile.",
             why="It lists the groups that hold one.",
         )
-    inputs = text_list(file, "/entry/inputs/names")
+    inputs = file.text_list("/entry/inputs/names")
     sources = {name: read_source(file, f"/entry/inputs/{name}") for name in inputs}
     numbers = [_scan_number(file, path) for path in paths]
     scans = _read_scans(file, paths, numbers, sources)
@@ -147,10 +147,10 @@ def stress_from(file: SafeFile) -> MeasuredStress:
         scans=scans,
         **read_record(records.CONVERSION.read_in(scans[0].reading), file, "/entry/sensor"),
         checks=groups.read_quality(file),
-        overridden=(*text_list(file, "/entry/overridden"), *accepted),
+        overridden=(*file.text_list("/entry/overridden"), *accepted),
         process=replace(process, messages=(*override_messages(accepted), *process.messages)),
         artifact=sources.get("artifact"),
-        artifact_digest=optional_text(file, "/entry/sensor/content_sha256"),
+        artifact_digest=file.optional_text("/entry/sensor/content_sha256"),
     )
 
 
@@ -162,7 +162,7 @@ def write_stress(measured: MeasuredStress, path: FilePath, *, overwrite: bool = 
 
 def profile_paths(file: SafeFile) -> list[str]:
     """Return the paths of the groups that hold a profile each; none in another schema's file."""
-    return [f"/entry/{name}" for name in text_list(file, "/entry/profiles")]
+    return [f"/entry/{name}" for name in file.text_list("/entry/profiles")]
 
 
 def _entry(measured: MeasuredStress) -> Group:
@@ -206,7 +206,7 @@ def _entry(measured: MeasuredStress) -> Group:
 
 def _scan_number(file: SafeFile, path: str) -> int:
     """Which scan a profile comes from, counted from one."""
-    number = values.require_scalar(file, f"{path}/scan", "dimensionless")
+    number = file.require_scalar(f"{path}/scan", "dimensionless")
     if not 1 <= number <= _MOST_SCANS:
         raise FormatError(
             f"{file.where(path)}/scan is {number:g}.",
@@ -305,9 +305,9 @@ def _read_roots(file: SafeFile, name: str, path: str, n: int) -> Arrays:
         prefix = "covariance_"
         dimension = "stress squared"
     roots = {}
-    for source in text_list(file, f"{where}/sources"):
+    for source in file.text_list(f"{where}/sources"):
         place = f"{where}/{prefix}{source}"
-        stored = values.require_array(file, place, dimension)
+        stored = file.require_array(place, dimension)
         shape = (n, n) if as_matrices else (n, *stored.shape[1:2])
         if stored.shape != shape or not stored.size or not np.isfinite(stored).all():
             raise FormatError(f"{file.where(place)} should hold finite numbers in {n} rows.")

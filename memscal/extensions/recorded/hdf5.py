@@ -8,7 +8,6 @@ from memscal.extensions.recorded.columns import RecordedColumns
 from memscal.formats.files import FilePath
 from memscal.formats.hdf5.reader import SafeFile, open_hdf5
 from memscal.formats.hdf5.writer import SCHEMA_ATTRIBUTE
-from memscal.formats.values import units_of
 
 #: Groups that @default leads through: that of the file, of its entry, and of a part of it.
 _MOST_DEFAULTS = 3
@@ -27,7 +26,7 @@ def open_datasets(path: FilePath, named: Mapping[str, Any], **reading: Any) -> R
         # A path is one however it begins, but the messages name it as it was given.
         places = {column: "/" + column.strip("/") for column in stated.values()}
         arrays = {column: file.array(place) for column, place in places.items()}
-        units = [units_of(file, place) or "" for place in places.values()]
+        units = [file.units_of(place) or "" for place in places.values()]
     rows = arrays[stated["u_zz"]].size if "u_zz" in stated else 0
     return RecordedColumns(file.source, arrays, units, rows, defaults, **reading)
 

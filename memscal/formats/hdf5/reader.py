@@ -5,6 +5,7 @@ every dataset is checked before it is read.
 """
 
 import hashlib
+import json
 import math
 import os
 from collections.abc import Callable, Iterable, Iterator
@@ -16,16 +17,20 @@ from typing import Any
 import h5py
 import numpy as np
 
-from memscal.errors import FormatError, UnsafeFileError, placed
+from memscal.errors import FormatError, InputError, UnsafeFileError, placed
 from memscal.formats.files import FilePath, damage_named, read_bytes
 from memscal.formats.hdf5 import limits
 from memscal.formats.hdf5.limits import MAX_TEXT_BYTES, refuse
+from memscal.formats.units import dimension_of, to_si
+from memscal.model.arrays import FloatArray, Values
 from memscal.model.notation import printable
 from memscal.model.provenance import SourceFile
+from memscal.model.quantities import DIMENSIONS
 from memscal.model.sizes import MOST_HDF5_BYTES
 
 _MAX_ATTRIBUTE_BYTES = 2**16
 _MAX_ATTRIBUTE_ITEMS = 64
+_MAX_ITEMS = 10_000
 _SCALES = b"DIMENSION_LIST"
 #: What changes the numbers of an array: beside it, and among its attributes, with which of them it
 #: changes; a fill value may have been stored in fewer digits.
@@ -69,6 +74,14 @@ def open_hdf5(path: FilePath, *, accept_altered: bool = False) -> Iterator["Safe
     finally:
         with suppress(Exception):
             file.close()
+
+
+def _finite(text: str) -> float:
+    """Return a number of JSON, which has no others."""
+    number = float(text)
+    if not math.isfinite(number):
+        raise ValueError(f"{text} is no finite number")
+    return number
 
 
 class SafeFile:
@@ -151,7 +164,7 @@ class SafeFile:
         """Return the text at a path, without characters that do not print."""
         if path not in self._texts:
             with damage_named(f"{self.where(path)} cannot be read"):
-                dataset = self._dataset(path)
+                dataset = self._dataset(path, "It should hold text.")
                 of = limits.check_layout(self.where(path), dataset, self._data, text=True)
                 self._spend(path, of.size)
                 if of.kind.is_variable_str():
@@ -173,6 +186,70 @@ class SafeFile:
             with damage_named(f"{self.where(path)}@{name} cannot be read"):
                 self._attributes[path, name] = self._read_attribute(path, name)
         return self._attributes[path, name]
+
+    def units_of(self, path: str) -> str | None:
+        """Return the unit that stands at a path, or ``None``."""
+        units = self.attribute(path, "units")
+        if isinstance(units, tuple) and len(units) == 1:
+            units = units[0]
+        return None if units is None else str(units)
+
+    def require_array(self, path: str, dimension: str, *, ndim: int | None = None) -> FloatArray:
+        """Return the array at a path in SI units."""
+        if not self.has(path):
+            raise FormatError(
+                f"{self.where(path)} is missing.",
+                why=f"It should hold a {dimension}.",
+                cure=f'Write it, with an attribute units such as "{DIMENSIONS[dimension].si}".',
+            )
+        values = self.array(path)
+        if ndim is not None and values.ndim != ndim:
+            raise FormatError(
+                f"{self.where(path)} has {values.ndim} dimensions, but {ndim} are expected.",
+                cure="Check the shape of the array.",
+            )
+        return to_si(values, self.units_of(path), dimension, self.where(path))
+
+    def require_scalar(self, path: str, dimension: str) -> float:
+        """Return the one number at a path in SI units; an array of one is accepted."""
+        return self.only_number(path, self.require_array(path, dimension))
+
+    def only_number(self, path: str, values: FloatArray) -> float:
+        """Return the one number that is stored at a path."""
+        if values.size != 1:
+            raise FormatError(
+                f"{self.where(path)} has {values.size} values, but one number is expected."
+            )
+        return values.item()
+
+    def any_scalar(self, path: str) -> tuple[float, str]:
+        """Return a number of any dimension in SI units, with its SI unit."""
+        dimension = dimension_of(self.units_of(path) or "1", self.where(path))
+        return self.require_scalar(path, dimension), DIMENSIONS[dimension].si
+
+    def optional_text(self, path: str) -> str:
+        """Return the text at a path, empty where there is none."""
+        return self.text(path) if self.has(path) else ""
+
+    def json_value(self, path: str, kind: type[list[Any] | Values], default: Any) -> Any:
+        """Return JSON of a type (``list`` or ``dict``), or the default where there is none."""
+        if not self.has(path):
+            return default
+        try:
+            value = json.loads(self.text(path), parse_constant=_finite, parse_float=_finite)
+        except (ValueError, RecursionError) as error:
+            raise InputError(
+                f"{self.where(path)} is not JSON: {error}.", cure="Write the file again."
+            ) from error
+        if not isinstance(value, kind):
+            raise FormatError(f"{self.where(path)} should hold a JSON {kind.__name__}.")
+        if len(value) > _MAX_ITEMS:
+            raise FormatError(f"{self.where(path)} lists {len(value):,} items.")
+        return value
+
+    def text_list(self, path: str) -> list[str]:
+        """Return the texts of a JSON list, such as names; none where there is no list."""
+        return [str(text) for text in self.json_value(path, list, [])]
 
     def scaled_by(self, path: str, scale: str) -> list[int]:
         """Return the axes of a dataset to which the dimension scale at a path is attached."""
@@ -230,14 +307,14 @@ class SafeFile:
             )
         return h5py.h5o.open(folder, key)
 
-    def _existing(self, path: str) -> Any:
+    def _existing(self, path: str, why: str = "") -> Any:
         item = self._open(path)
         if item is None:
-            raise FormatError(f"{self.where(path)} is missing.")
+            raise FormatError(f"{self.where(path)} is missing.", why=why)
         return item
 
-    def _dataset(self, path: str) -> Any:
-        item = self._existing(path)
+    def _dataset(self, path: str, why: str = "") -> Any:
+        item = self._existing(path, why)
         if not isinstance(item, h5py.h5d.DatasetID):
             raise FormatError(f"{self.where(path)} is not a dataset.")
         return item
