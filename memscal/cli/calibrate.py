@@ -13,10 +13,25 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from memscal.cli import options as common
 from memscal.cli import output as out
 from memscal.cli.failures import DONE, debug_option, exit_code_of
-from memscal.cli.options import FILE, NonNegative, option, options_of
+from memscal.cli.options import (
+    FILE,
+    FILM_LAWS,
+    NonNegative,
+    Options,
+    accept_altered_option,
+    brief_option,
+    figure_option,
+    force_option,
+    json_option,
+    option,
+    options_of,
+    out_option,
+    report_option,
+    rod_friction_option,
+    scans_argument,
+)
 from memscal.formats.files import together
 
 if TYPE_CHECKING:
@@ -89,7 +104,7 @@ def _option(text: str) -> tuple[str, Any]:
     return name, value
 
 
-def _check_kinds(values: common.Options, usual: Method) -> None:
+def _check_kinds(values: Options, usual: Method) -> None:
     """Refuse text where the method's default is a number, or a fraction where it is a count."""
     for name, value in values.items():
         default = getattr(usual, name, None)
@@ -135,13 +150,13 @@ calibration_options = options_of(
         "The same stress by another model of the film (memscal-reference): its difference is "
         "counted as an uncertainty of the model's form, in place of the linear film's."
     ),
-    option("--film-law", click.Choice(common.FILM_LAWS))(
+    option("--film-law", click.Choice(FILM_LAWS))(
         "Law of the film by which the rod is solved, taken as known. By default the one that scan "
         "or reference state; else neo-hookean, and its difference from linear is counted "
         "(model_form)."
     ),
     option("--mooney-rivlin-ratio", NonNegative("ratio"))("C2/C1 of --film-law mooney-rivlin."),
-    common.rod_friction_option(
+    rod_friction_option(
         "Whether the film slides freely under the rod (0) or sticks (inf), which matters at finite"
         " strain. By default as the scan states it; else midway, and the rest is counted."
     ),
@@ -171,7 +186,7 @@ calibration_options = options_of(
     option("--override", is_flag=True)(
         "Go on although a reference is of another film, rod or load than its scan: recorded."
     ),
-    common.accept_altered_option,
+    accept_altered_option,
     option("--relative", is_flag=True)(
         "For scans at constant depth or of unknown load: no load counts, A is relative, and states"
         " no pascals."
@@ -204,17 +219,17 @@ def calibration_settings(
 
 
 @click.command("calibrate", epilog=EXAMPLES)
-@common.scans_argument()
-@common.out_option("Artifact to write; by default SCAN.apparatus.h5 beside SCAN.h5.")
+@scans_argument()
+@out_option("Artifact to write; by default SCAN.apparatus.h5 beside SCAN.h5.")
 @calibration_options
 @option("--free", click.Choice(("thickness",)), multiple=True)(
     "Estimate the film's thickness, too, from scans with several rods, or at several loads on a "
     "film of a stated law that is not linear; the stated thickness is its prior."
 )
-@common.json_option
-@common.brief_option
-@common.report_option
-@common.figure_option("Draw scan, apparatus function and transfer function.")
+@json_option
+@brief_option
+@report_option
+@figure_option("Draw scan, apparatus function and transfer function.")
 @option("--sweep sweeping", is_flag=True)(
     "Show how the results depend on the noise amplitude, over two decades and eight seeds."
 )
@@ -228,7 +243,7 @@ def calibration_settings(
 @option("--compact", is_flag=True)(
     "Leave G over the plane out of the artifact where it is round, which halves its size."
 )
-@common.force_option
+@force_option
 @option("--dry-run", is_flag=True)(
     "Read and check every input, print what would be done, and write nothing."
 )
@@ -299,7 +314,7 @@ def command(
     return exit_code_of(apparatus.checks, then=then)
 
 
-def _read(paths: tuple[Path, ...], reference: Path | None, settings: common.Options) -> list[Scan]:
+def _read(paths: tuple[Path, ...], reference: Path | None, settings: Options) -> list[Scan]:
     from memscal.estimation.set_up import require_calibration_rod
     from memscal.formats.opened import opened_scans
     from memscal.model.sizes import MOST_OF_LINES
@@ -330,9 +345,7 @@ def _read_reference(path: Path, pixel_size: str | None, accepted: bool) -> Stres
     return read_reference(path, pixel_size=size, accept_altered=accepted)
 
 
-def _rehearse(
-    scans: list[Scan], settings: common.Options, outputs: Sequence[Path], as_json: bool
-) -> None:
+def _rehearse(scans: list[Scan], settings: Options, outputs: Sequence[Path], as_json: bool) -> None:
     """Check what a calibration checks before it computes, and print what it would do."""
     from memscal.calibration.prepare import Request, prepare
     from memscal.calibration.stages import require_channel_method

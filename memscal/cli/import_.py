@@ -8,9 +8,27 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from memscal.cli import options as common
 from memscal.cli import output as out
-from memscal.cli.options import FILE, NonNegative, Quantity, option, output_options, si
+from memscal.cli.options import (
+    FILE,
+    FILM,
+    FREE_OR_STUCK,
+    LAW,
+    NonNegative,
+    Options,
+    Quantity,
+    film_from,
+    film_options,
+    indenter_from,
+    laboratory_option,
+    named,
+    option,
+    output_options,
+    radius_options,
+    rod_friction_option,
+    si,
+    with_laboratory,
+)
 from memscal.extensions import hook
 from memscal.formats.files import together
 from memscal.model.checks import marked_texts
@@ -31,7 +49,7 @@ _POSITION = Quantity("mm", low=-float("inf"))
 _SIGN = click.Choice(["1", "-1"])
 
 
-def _read_reference(path: Path, mesh: bool, options: common.Options) -> ImportedProfile:
+def _read_reference(path: Path, mesh: bool, options: Options) -> ImportedProfile:
     """Read the reference with the options given; for the others the library's defaults hold."""
     setting = _stated(options, (*_SHARED, "load")) | _set_up(options)
     if not mesh:
@@ -263,7 +281,7 @@ _NEEDED_WITH_MESH = ("r_unit", "sigma_unit")
 )
 @option("--load-cell-serial", "TEXT")("Scan: serial number of the load cell.")
 @option("--title", "TEXT")("Scan: title.")
-@common.laboratory_option("Scan: ")
+@laboratory_option("Scan: ")
 @option("--r", "COLUMN")("Reference: column of the radius.")
 @option("--r-unit", "UNIT")(
     "Reference: unit of the radius, or of a mesh's coordinates, such as mm."
@@ -295,9 +313,9 @@ _NEEDED_WITH_MESH = ("r_unit", "sigma_unit")
     "Mesh in 3-D: where the indenter's axis meets the base, in mm.  [default: 0 0]"
 )
 @option("--indenter", click.Choice(["rod", "sphere"]))("Shape of the indenter.  [default: rod]")
-@common.radius_options("the rod or of the sphere's curvature")
-@common.film_options()
-@common.rod_friction_option(common.FREE_OR_STUCK)
+@radius_options("the rod or of the sphere's curvature")
+@film_options()
+@rod_friction_option(FREE_OR_STUCK)
 @option("--sheet", "NAME")("Sheet of a workbook.  [default: the first that is visible]")
 @option("--scan", click.IntRange(1), metavar="N")(
     "Scan: which one of a file of SPEC or Bluesky: the number after #S, or counted from 1."
@@ -339,7 +357,7 @@ def command(
             with out.working("Reading"):
                 scan = _read_scan(table, options)
             notes = scan.messages
-            write_scan(common.with_laboratory(laboratory, scan), output, overwrite=force)
+            write_scan(with_laboratory(laboratory, scan), output, overwrite=force)
             if scan.holds is not None:
                 out.write_files(out.rendered(scan.holds.plot, figures), force=force)
         else:
@@ -358,7 +376,7 @@ def command(
     out.say_written([output])
 
 
-def _check_usage(path: Path, kind: str, mesh: bool, options: common.Options) -> None:
+def _check_usage(path: Path, kind: str, mesh: bool, options: Options) -> None:
     """Name every option that is missing, or that belongs to something else, at once."""
     if kind == "scan" and mesh:
         raise click.UsageError(f"{path.name} is a mesh, and no scan: add --format reference.")
@@ -372,13 +390,13 @@ def _check_usage(path: Path, kind: str, mesh: bool, options: common.Options) -> 
     missing = [name for name in needed if options[name] is None]
     if missing:
         raise click.UsageError(
-            f"A {kind} needs more: add {common.named(missing)}. See the examples of "
+            f"A {kind} needs more: add {named(missing)}. See the examples of "
             "`memscal import --help`."
         )
     other = "reference" if kind == "scan" else "scan"
     misplaced = _stated(options, _ONLY[other])
     if misplaced:
-        raise click.UsageError(f"{common.named(misplaced)} belong to --format {other}.")
+        raise click.UsageError(f"{named(misplaced)} belong to --format {other}.")
     if options["value"] is not None and options["load"] is not None:
         raise click.UsageError("Give --load, or --value in its place.")
     if options["rod_friction"] is not None and options["indenter"] == "sphere":
@@ -387,12 +405,12 @@ def _check_usage(path: Path, kind: str, mesh: bool, options: common.Options) -> 
         raise click.UsageError("--figure belongs to --holds.")
     of_holds = _stated(options, _OF_HOLDS)
     if of_holds and options["holds"] is None:
-        raise click.UsageError(f"{common.named(of_holds)} belong to --holds.")
+        raise click.UsageError(f"{named(of_holds)} belong to --holds.")
     if not mesh and options["shear_sign"] is not None and options["shear"] is None:
         raise click.UsageError("--shear-sign belongs to --shear.")
     unused = _stated(options, (*_TABLE_ONLY, *_READING) if mesh else _MESH_ONLY)
     if unused and kind == "reference":
-        problem = f"A {'mesh' if mesh else 'table'} has no use for {common.named(unused)}."
+        problem = f"A {'mesh' if mesh else 'table'} has no use for {named(unused)}."
         raise click.UsageError(problem)
 
 
@@ -409,16 +427,16 @@ _UNKNOWN = (
 )
 
 
-def _set_up(options: common.Options) -> dict[str, Any]:
+def _set_up(options: Options) -> dict[str, Any]:
     stated: dict[str, Any] = {}
-    if _stated(options, [name for name in options if name.startswith((*common.FILM, *common.LAW))]):
-        stated["film"] = common.film_from(options, _UNKNOWN)
+    if _stated(options, [name for name in options if name.startswith((*FILM, *LAW))]):
+        stated["film"] = film_from(options, _UNKNOWN)
     if _stated(options, ("indenter", "radius", "radius_uncertainty", "rod_friction")):
-        stated["indenter"] = common.indenter_from(options["indenter"] or "rod", options)
+        stated["indenter"] = indenter_from(options["indenter"] or "rod", options)
     return stated
 
 
-def _read_scan(path: Path, options: common.Options) -> ImportedScan:
+def _read_scan(path: Path, options: Options) -> ImportedScan:
     from memscal.formats.tables.scan import import_table
     from memscal.formats.tables.stated import ScanConditions, ScanUncertainties, TableLayout
     from memscal.model.instrument import LoadCell, StressSensor

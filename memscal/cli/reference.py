@@ -8,17 +8,23 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from memscal.cli import options as common
 from memscal.cli import output as out
 from memscal.cli.options import (
     FILE,
     PAPER_FILM,
     NonNegative,
+    Options,
     Quantity,
     figure_option,
+    film_from,
+    film_options,
     indenter_from,
+    named,
     option,
     options_of,
+    out_option,
+    output_options,
+    radius_options,
     si,
 )
 from memscal.extensions import hook
@@ -60,16 +66,16 @@ interface_options = options_of(
 """The options of a rough interface."""
 
 
-def _indenter(shape: str, options: common.Options) -> Indenter:
+def _indenter(shape: str, options: Options) -> Indenter:
     """Return the indenter that the options describe."""
     needed = _DESCRIBED_BY[shape]
     for name in sorted(set(_DESCRIBED_BY.values()) - {needed}):
         if options[name] is not None:
-            raise click.UsageError(f"{common.named([name])} does not describe a {shape}.")
+            raise click.UsageError(f"{named([name])} does not describe a {shape}.")
     if shape in _RADIUS:
         return indenter_from(shape, {**options, "radius": options["radius"] or _RADIUS[shape]})
     if options[needed] is None:
-        raise click.UsageError(f"A {shape} needs {common.named([needed])}.")
+        raise click.UsageError(f"A {shape} needs {named([needed])}.")
     if shape == "cone":
         from memscal.model.indenter import Cone
 
@@ -81,7 +87,7 @@ def _indenter(shape: str, options: common.Options) -> Indenter:
     )
 
 
-def interface_of(options: common.Options) -> Interface:
+def interface_of(options: Options) -> Interface:
     """Return the interface that the options describe."""
     from memscal.mechanics.interface import ExponentialCompliance, GreenwoodTripp, Interface
 
@@ -121,7 +127,7 @@ Examples:
 @option("--depth depths", Quantity("um"), multiple=True)(
     "Indentation depth, in um, in place of a load. May be repeated."
 )
-@common.radius_options("the rod or of the sphere's curvature", uncertainties=False)
+@radius_options("the rod or of the sphere's curvature", uncertainties=False)
 @option("--inclination", Quantity("deg", high=89.0))(
     "Cone: angle between its face and the film, in degrees."
 )
@@ -138,7 +144,7 @@ Examples:
     "A point sticks where it first touched, or as if loaded in one step. The same under a rod."
 )
 @interface_options
-@common.film_options(defaults={**PAPER_FILM, "film-law": None}, uncertainties=False)
+@film_options(defaults={**PAPER_FILM, "film-law": None}, uncertainties=False)
 @option("--backend", click.Choice(["hankel", "fem"]), "hankel")(
     "Hankel transforms on an infinite film, or finite elements on one with a free edge."
 )
@@ -152,13 +158,13 @@ Examples:
 @option("--rings", click.IntRange(min=16))(
     "Rings from the axis to the largest contact.  [default: as many as it takes]"
 )
-@common.out_option("Reference file to write (memscal-reference); for one load or depth.")
+@out_option("Reference file to write (memscal-reference); for one load or depth.")
 @figure_option("Draw the contacts.")
 @option("--mesh", FILE, metavar="FILE.vtu")(
     "Displacement and stress in the film, for ParaView (needs meshio); for finite elements "
     "and one load or depth."
 )
-@common.output_options
+@output_options
 def command(indenter: str, as_json: bool, force: bool, **options: Any) -> None:
     """Press a rigid INDENTER on a bonded film: load, depth, contact, and stress at the base.
 
@@ -176,7 +182,7 @@ def command(indenter: str, as_json: bool, force: bool, **options: Any) -> None:
     out.say_written(files)
 
 
-def _check_usage(options: common.Options) -> None:
+def _check_usage(options: Options) -> None:
     """Refuse options that do not go together, and choose the film's law."""
     loads = options["loads"]
     depths = options["depths"]
@@ -195,7 +201,7 @@ def _check_usage(options: common.Options) -> None:
         raise click.UsageError(f"{mesh} does not end in .vtu, the format of --mesh.")
 
 
-def _choose_law(options: common.Options) -> None:
+def _choose_law(options: Options) -> None:
     """Choose the film's law by --strain where it is not given."""
     law = options["film_law"]
     strain = options["strain"]
@@ -207,10 +213,10 @@ def _choose_law(options: common.Options) -> None:
         options["film_law"] = law or ("neo-hookean" if strain else "linear")
 
 
-def _pressed(indenter: str, options: common.Options) -> list[Contact]:
+def _pressed(indenter: str, options: Options) -> list[Contact]:
     from memscal.mechanics.indent import indent
 
-    film = common.film_from(options)
+    film = film_from(options)
     body = _indenter(indenter, options)
     linear = film.law == "linear"
     friction = options["friction"]
@@ -235,7 +241,7 @@ def _pressed(indenter: str, options: common.Options) -> list[Contact]:
         )
 
 
-def _write(contacts: list[Contact], options: common.Options, *, force: bool) -> None:
+def _write(contacts: list[Contact], options: Options, *, force: bool) -> None:
     """Write the files."""
     from memscal.formats.reference import write_reference
 
@@ -249,7 +255,7 @@ def _write(contacts: list[Contact], options: common.Options, *, force: bool) -> 
     out.write_files(figures, force=force)
 
 
-def _print(contacts: list[Contact], options: common.Options, *, as_json: bool) -> list[Message]:
+def _print(contacts: list[Contact], options: Options, *, as_json: bool) -> list[Message]:
     from memscal.summaries.contact import contacts_table, depth_messages
 
     messages, warnings = depth_messages(contacts)
