@@ -33,7 +33,6 @@ from memscal.formats.files import together
 if TYPE_CHECKING:
     from memscal.mechanics.contact import Contact
     from memscal.mechanics.interface import Interface
-    from memscal.model.checks import Message
     from memscal.model.indenter import Indenter
 
 #: The paper's rod and sphere, in mm.
@@ -172,12 +171,30 @@ def command(indenter: str, as_json: bool, force: bool, **options: Any) -> None:
     rod of radius 0.25 mm, a sphere of radius 128.8 mm. Without --film-law the film is linear.
     """
     _check_usage(options)
+
+    from memscal.formats.reference import write_reference
+    from memscal.summaries.contact import contacts_table, depth_messages
+
     files = [options["output"], options["mesh"], *options["figures"]]
     out.prove_writable(files, force=force, inputs=[options["profile_table"]])
+    output, mesh, *figures = files
     contacts = _pressed(indenter, options)
+    drawn = out.rendered(partial(contacts[0].plot, beside=contacts[1:]), figures)
+    messages, warnings = depth_messages(contacts)
     with together():
-        _write(contacts, options, force=force)
-        messages = _print(contacts, options, as_json=as_json)
+        if mesh is not None:
+            hook("write_mesh")(contacts[0].mesh(), mesh, overwrite=force)
+        if output is not None:
+            write_reference(contacts[0].profile(), output, overwrite=force)
+        out.write_files(drawn, force=force)
+        if as_json:
+            # A rod's contact does not depend on the loading that was asked for.
+            loading = {"loading": options["loading"]}
+            solutions = [contact.to_dict() | loading for contact in contacts]
+            head = {"schema_version": "1", "output": output and str(output)}
+            out.emit_json({**head, "solutions": solutions, "warnings": warnings})
+        else:
+            out.emit_tables(contacts_table(contacts))
     out.show_messages(messages)
     out.say_written(files)
 
@@ -239,33 +256,3 @@ def _pressed(indenter: str, options: Options) -> list[Contact]:
             film_radius=si(options["film_radius"], -3),
             strain="linear" if linear else "finite",
         )
-
-
-def _write(contacts: list[Contact], options: Options, *, force: bool) -> None:
-    """Write the files."""
-    from memscal.formats.reference import write_reference
-
-    output = options["output"]
-    mesh = options["mesh"]
-    figures = out.rendered(partial(contacts[0].plot, beside=contacts[1:]), options["figures"])
-    if mesh is not None:
-        hook("write_mesh")(contacts[0].mesh(), mesh, overwrite=force)
-    if output is not None:
-        write_reference(contacts[0].profile(), output, overwrite=force)
-    out.write_files(figures, force=force)
-
-
-def _print(contacts: list[Contact], options: Options, *, as_json: bool) -> list[Message]:
-    from memscal.summaries.contact import contacts_table, depth_messages
-
-    messages, warnings = depth_messages(contacts)
-    if as_json:
-        # A rod's contact does not depend on the loading that was asked for.
-        loading = options["loading"]
-        output = options["output"]
-        solutions = [{**contact.to_dict(), "loading": loading} for contact in contacts]
-        head = {"schema_version": "1", "output": output and str(output)}
-        out.emit_json({**head, "solutions": solutions, "warnings": warnings})
-    else:
-        out.emit_tables(contacts_table(contacts))
-    return messages
