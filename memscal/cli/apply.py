@@ -15,7 +15,6 @@ from memscal.cli.options import (
     scans_argument,
     trust_options,
 )
-from memscal.formats.files import together
 
 EXAMPLES = """\b
 Examples:
@@ -32,9 +31,7 @@ Examples:
 @trust_options
 @figure_option("Draw the profiles of all loads, linear and logarithmic.")
 @report_options
-def command(
-    artifact: Path, scans: tuple[Path, ...], as_json: bool, force: bool, **options: Any
-) -> int:
+def command(artifact: Path, scans: tuple[Path, ...], **options: Any) -> int:
     """Turn contact SCANs into measured stress with a calibrated sensor (ARTIFACT).
 
     For each load of each scan, finds centre and baseline and gives the profile S_zz = U/A at the
@@ -50,17 +47,9 @@ def command(
     accepted = {name: options[name] for name in ("override", "accept_altered")}
     data = opened_scans(scans, accept_altered=accepted["accept_altered"])
     written = options["output"] or out.default_name(scans[0], ".stress.h5")
-    figures = options["figures"]
-    report = options["report"]
-    out.prove_writable([written, *figures, report], force=force, inputs=[artifact, *scans])
+    outputs = [written, *options["figures"], options["report"]]
+    out.prove_writable(outputs, force=options["force"], inputs=[artifact, *scans])
     with out.working("Measuring"):
         stress = measure_stress(data, artifact, **accepted)
-    files = out.drawn(stress, figures, report)
-    with together():
-        stress.save(written, overwrite=force)
-        out.write_files(files, force=force)
-        head = {"output": str(written)}
-        out.emit_result(stress, head, as_json=as_json, brief=options["brief"])
-    out.show_messages(stress.messages)
-    out.say_written([written, *files])
+    out.deliver(stress, written, stress.save, options)
     return exit_code_of(stress.checks)

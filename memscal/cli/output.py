@@ -299,3 +299,19 @@ def write_files(contents: Mapping[Path, bytes], *, force: bool) -> None:
     with together():
         for path, content in contents.items():
             atomic_write_bytes(path, content, overwrite=force)
+
+
+def deliver(
+    result: Any, output: Path | None, save: Callable[..., None], options: Mapping[str, Any]
+) -> None:
+    """Write a result, its figures and its page, all of them or none; print it, and what it says."""
+    force = options["force"]
+    files = drawn(result, options["figures"], options["report"])
+    with together():
+        if output is not None:
+            save(output, overwrite=force)
+        write_files(files, force=force)
+        head = {"output": output and str(output)}
+        emit_result(result, head, as_json=options["as_json"], brief=options["brief"])
+    show_messages(result.messages)
+    say_written([output, *files])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,7 +21,6 @@ from memscal.cli.options import (
     report_options,
     trust_options,
 )
-from memscal.formats.files import together
 
 if TYPE_CHECKING:
     from memscal.measurement.restoration import Restoration
@@ -49,7 +49,7 @@ Examples:
 @trust_options
 @figure_option("Draw the restored, the measured and the calculated stress, and residuals.")
 @report_options
-def command(artifact: Path, scan: Path, as_json: bool, force: bool, **options: Any) -> int:
+def command(artifact: Path, scan: Path, **options: Any) -> int:
     """Restore the stress at the base of a film from a SCAN with a calibrated sensor (ARTIFACT).
 
     Takes the sensor's conversion constant A and apparatus function G as known, and finds the
@@ -65,28 +65,18 @@ def command(artifact: Path, scan: Path, as_json: bool, force: bool, **options: A
 
     output = options["output"]
     expected = options["expected"]
-    figures = options["figures"]
-    report = options["report"]
     accepted = {"accept_altered": options["accept_altered"]}
     apparatus = load_apparatus(artifact, **accepted)
     data = read_scan(scan, **accepted)
     stress = None if expected is None else read_reference(expected, **accepted)
-    inputs = [artifact, scan, expected]
-    out.prove_writable([output, *figures, report], force=force, inputs=inputs)
+    outputs = [output, *options["figures"], options["report"]]
+    out.prove_writable(outputs, force=options["force"], inputs=[artifact, scan, expected])
     with out.working("Restoring"):
         settings = {name: options[name] for name in ("load", "override")}
         restored = restore(data, apparatus, expected=stress, **settings)
         if stress is None:
             restored = _with_contact(restored)
-    files = out.drawn(restored, figures, report)
-    with together():
-        if output is not None:
-            write_reference(restored.profile(), output, overwrite=force)
-        out.write_files(files, force=force)
-        head = {"output": output and str(output)}
-        out.emit_result(restored, head, as_json=as_json, brief=options["brief"])
-    out.show_messages(restored.messages)
-    out.say_written([output, *files])
+    out.deliver(restored, output, partial(write_reference, restored.profile()), options)
     return exit_code_of(restored.checks)
 
 
