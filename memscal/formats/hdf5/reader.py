@@ -11,8 +11,8 @@ import os
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import replace
-from functools import partial
-from typing import Any
+from functools import partial, wraps
+from typing import Any, TypeVar, cast
 
 import h5py
 import numpy as np
@@ -48,6 +48,7 @@ _CHANGES: dict[str, Callable[[Any, Any], Any]] = {
 StoredAttribute = str | int | float | tuple[str, ...] | tuple[float, ...] | None
 """Text, a number, a few of either, or nothing."""
 
+_Read = TypeVar("_Read", bound=Callable[..., Any])
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
 
@@ -84,6 +85,20 @@ def _finite(text: str) -> float:
     return number
 
 
+def _kept(read: _Read) -> _Read:
+    """Keep what a method reads at a path, or of an attribute there; say where it is damaged."""
+
+    @wraps(read)
+    def kept(file: "SafeFile", *place: str) -> Any:
+        key = (read, *place)
+        if key not in file.kept:
+            with damage_named(f"{file.where('@'.join(place))} cannot be read"):
+                file.kept[key] = read(file, *place)
+        return file.kept[key]
+
+    return cast("_Read", kept)
+
+
 class SafeFile:
     """An open file whose content is reached by known paths only."""
 
@@ -95,11 +110,9 @@ class SafeFile:
         self._opened: dict[str, Any] = {"/": file["/"].id}
         # Of a small file no more than it may well stand for.
         self._budget = self._most = limits.most_held(len(data))
-        self._arrays: dict[str, np.ndarray[Any, Any]] = {}
-        self._texts: dict[str, str] = {}
+        self.kept: dict[Any, Any] = {}
         self._listed: frozenset[str] | None = None
         self._heaps: set[int] = set()  # addresses of those that are sound
-        self._attributes: dict[tuple[str, str], StoredAttribute] = {}
 
     def where(self, path: str) -> str:
         """Return file and path as messages name them."""
@@ -138,20 +151,18 @@ class SafeFile:
         with damage_named(f"{self.where(path)} cannot be opened"):
             return isinstance(self._open(path), h5py.h5g.GroupID)
 
+    @_kept
     def array(self, path: str) -> np.ndarray[Any, Any]:
         """Return the numbers at a path: 64-bit floats, or 64-bit integers where stored so."""
-        if path not in self._arrays:
-            with damage_named(f"{self.where(path)} cannot be read"):
-                dataset = self._dataset(path)
-                of = limits.check_layout(self.where(path), dataset, self._data, text=False)
-                self._spend(path, of.held)
-                whole = of.kind.get_class() == h5py.h5t.INTEGER
-                values = np.empty(of.shape, dtype=np.int64 if whole else np.float64)
-                dataset.read(h5py.h5s.ALL, h5py.h5s.ALL, values)
-                self._require_plain(path, values)
-                values.setflags(write=False)
-                self._arrays[path] = values
-        return self._arrays[path]
+        dataset = self._dataset(path)
+        of = limits.check_layout(self.where(path), dataset, self._data, text=False)
+        self._spend(path, of.held)
+        whole = of.kind.get_class() == h5py.h5t.INTEGER
+        values = np.empty(of.shape, dtype=np.int64 if whole else np.float64)
+        dataset.read(h5py.h5s.ALL, h5py.h5s.ALL, values)
+        self._require_plain(path, values)
+        values.setflags(write=False)
+        return values
 
     def claimed_number(self, path: str) -> int:
         """Return how many numbers a dataset claims to hold, of which none is read; 0 if absent."""
@@ -160,32 +171,49 @@ class SafeFile:
         with damage_named(f"{self.where(path)} cannot be read"):
             return math.prod(limits.Layout.of(self.where(path), self._dataset(path)).shape)
 
+    @_kept
     def text(self, path: str) -> str:
         """Return the text at a path, without characters that do not print."""
-        if path not in self._texts:
-            with damage_named(f"{self.where(path)} cannot be read"):
-                dataset = self._dataset(path, "It should hold text.")
-                of = limits.check_layout(self.where(path), dataset, self._data, text=True)
-                self._spend(path, of.size)
-                if of.kind.is_variable_str():
-                    offset = dataset.get_offset() or -1
-                    self._check_length(path, limits.text_length(self._data, offset, self._heaps))
-                value = np.empty((), dtype=of.kind.dtype)
-                dataset.read(h5py.h5s.ALL, h5py.h5s.ALL, value)
-                self._texts[path] = printable(value[()], MAX_TEXT_BYTES)
-        return self._texts[path]
+        dataset = self._dataset(path, "It should hold text.")
+        of = limits.check_layout(self.where(path), dataset, self._data, text=True)
+        self._spend(path, of.size)
+        if of.kind.is_variable_str():
+            offset = dataset.get_offset() or -1
+            self._check_length(path, limits.text_length(self._data, offset, self._heaps))
+        value = np.empty((), dtype=of.kind.dtype)
+        dataset.read(h5py.h5s.ALL, h5py.h5s.ALL, value)
+        return printable(value[()], MAX_TEXT_BYTES)
 
     def is_text(self, path: str) -> bool:
         """Return whether a path holds a string and not a number."""
         with damage_named(f"{self.where(path)} cannot be read"):
             return bool(self._dataset(path).get_type().get_class() == h5py.h5t.STRING)
 
+    @_kept
     def attribute(self, path: str, name: str) -> StoredAttribute:
         """Return an attribute: text, a number, a few texts, or ``None`` where there is none."""
-        if (path, name) not in self._attributes:
-            with damage_named(f"{self.where(path)}@{name} cannot be read"):
-                self._attributes[path, name] = self._read_attribute(path, name)
-        return self._attributes[path, name]
+        item = self._existing(path)
+        key = name.encode("ascii")
+        if not h5py.h5a.exists(item, key):
+            return None
+        attribute = h5py.h5a.open(item, key)
+        where = f"{self.where(path)}@{name}"
+        kind, shape, size = limits.Layout.of(where, attribute)
+        number = math.prod(shape)
+        if len(shape) > 1 or number > _MAX_ATTRIBUTE_ITEMS or size > _MAX_ATTRIBUTE_BYTES:
+            raise refuse(where, f"has {number} values", "An attribute is one value or a few names.")
+        text = kind.get_class() == h5py.h5t.STRING
+        limits.check_type(where, kind, text=text)
+        self._spend(path, size)
+        if text and kind.is_variable_str():
+            self._check_texts(path, item, key, number)
+        values = np.empty(shape, dtype=kind.dtype)
+        attribute.read(values)
+        if not text:
+            numbers = tuple(values.ravel().tolist())
+            return numbers if number > 1 else next(iter(numbers), None)
+        texts = tuple(printable(text, _MAX_ATTRIBUTE_BYTES) for text in values.flat)
+        return texts if shape else texts[0]
 
     def units_of(self, path: str) -> str | None:
         """Return the unit that stands at a path, or ``None``."""
@@ -341,27 +369,3 @@ class SafeFile:
         address = h5py.h5o.get_info(item).addr
         for length in limits.attribute_text_lengths(self._data, address, key, number, self._heaps):
             self._check_length(path, length)
-
-    def _read_attribute(self, path: str, name: str) -> StoredAttribute:
-        item = self._existing(path)
-        key = name.encode("ascii")
-        if not h5py.h5a.exists(item, key):
-            return None
-        attribute = h5py.h5a.open(item, key)
-        where = f"{self.where(path)}@{name}"
-        kind, shape, size = limits.Layout.of(where, attribute)
-        number = math.prod(shape)
-        if len(shape) > 1 or number > _MAX_ATTRIBUTE_ITEMS or size > _MAX_ATTRIBUTE_BYTES:
-            raise refuse(where, f"has {number} values", "An attribute is one value or a few names.")
-        text = kind.get_class() == h5py.h5t.STRING
-        limits.check_type(where, kind, text=text)
-        self._spend(path, size)
-        if text and kind.is_variable_str():
-            self._check_texts(path, item, key, number)
-        values = np.empty(shape, dtype=kind.dtype)
-        attribute.read(values)
-        if not text:
-            numbers = tuple(values.ravel().tolist())
-            return numbers if number > 1 else next(iter(numbers), None)
-        texts = tuple(printable(text, _MAX_ATTRIBUTE_BYTES) for text in values.flat)
-        return texts if shape else texts[0]
