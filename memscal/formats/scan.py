@@ -24,8 +24,6 @@ _CHANNELS = ("u_xz", "u_xz_errors", "u_yz", "u_yz_errors")
 _DATA = "/entry/data"
 _SIGNAL = f"{_DATA}/u_zz"
 _SAMPLE = "/entry/sample"
-_AXES = {"line": ("x",), "repeats": ("repeat", "x"), "raster": ("y", "x")}
-_ALONG_Y = {"line": ("y",), "repeats": ("repeat", "y")}
 _DECLARED = by_name(records.SCAN_DATA.quantities)
 # The other arrays have the shape of the signal, which is that of the scan.
 _OWN_SHAPE = {"x", "y", "x_errors", "y_errors", "u_zz_correlation"}
@@ -194,12 +192,9 @@ def _entry(scan: Scan) -> Group:
 def _data_group(scan: Scan) -> Group:
     along = scan.direction
     points = scan.kind == "points"
-    data: Nodes = {}
-    axes: tuple[str, ...] = _POINTS
-    if points:
-        data["point"] = writer.index_axis("point", scan.x.size)
-    else:
-        axes = _ALONG_Y[scan.kind] if along == "y" else _AXES[scan.kind]
+    forms = {"points": _POINTS, "line": (along,), "repeats": ("repeat", along)}
+    axes = forms.get(scan.kind, ("y", "x"))
+    data: Nodes = {"point": writer.index_axis("point", scan.x.size)} if points else {}
     data |= _nodes(scan, {"y": scan.y}, axes if points else ("y",))
     if scan.repeat is not None:
         data["repeat"] = writer.Number(scan.repeat, "1", axes)
