@@ -192,12 +192,11 @@ def _checked_target(path: FilePath, *, overwrite: bool, inputs: Iterable[FilePat
     if not shown or "\0" in shown:
         raise OutputError(f"{shown!r} is not the name of a file.", cure="Give the output a name.")
     target = Path(os.path.realpath(shown))
-    try:
-        status = os.stat(target)
-    except FileNotFoundError:
-        return target
-    except OSError as error:
-        raise _output_error(Path(shown), error) from error
+    with _blamed(Path(shown)):
+        try:
+            status = os.stat(target)
+        except FileNotFoundError:
+            return target
     for source in inputs:
         with suppress(OSError):
             if os.path.samestat(status, os.stat(source)):
@@ -232,7 +231,10 @@ def _blamed(target: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise _output_error(target, error) from error
+        reason = os.strerror(error.errno) if error.errno else str(error)
+        problem = f"The output {target} cannot be written: {reason}."
+        cure = _CURES.get(error.errno or 0, "Choose another folder, or another name.")
+        raise OutputError(problem, why=_UNTOUCHED, cure=cure) from error
 
 
 def _flags(*names: str) -> int:
@@ -315,13 +317,6 @@ def _sync_folder(folder: Path) -> None:
             os.fsync(descriptor)
         finally:
             os.close(descriptor)
-
-
-def _output_error(target: Path, error: OSError) -> OutputError:
-    reason = os.strerror(error.errno) if error.errno else str(error)
-    problem = f"The output {target} cannot be written: {reason}."
-    cure = _CURES.get(error.errno or 0, "Choose another folder, or another name.")
-    return OutputError(problem, why=_UNTOUCHED, cure=cure)
 
 
 def read_bytes(path: FilePath, *, limit: int = MOST_FILE_BYTES) -> bytes:
