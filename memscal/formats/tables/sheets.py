@@ -79,12 +79,10 @@ def open_table(source: Any, named: Mapping[str, Any] = _NONE, **reading: Any) ->
         record: NamedColumns = hook("open_record")(kind, source, named, **reading)
         return record
     name = PurePath(source).name
-    data = read_bytes(source)
-    library = {"workbook": "openpyxl", "Parquet": "pyarrow.parquet"}[kind]
-    reader = installed(library, f"A {kind}", "tables")
-    read: Callable[..., NamedColumns] = _sheet_table if kind == "workbook" else _parquet_table
     with _reading(f"{name} cannot be read"):
-        return read(reader, name, data, **reading)
+        if kind == "workbook":
+            return _sheet_table(name, read_bytes(source), **reading)
+        return _parquet_table(name, read_bytes(source), **reading)
 
 
 def installed(library: str, what: str, extra: str) -> Any:
@@ -101,10 +99,9 @@ def installed(library: str, what: str, extra: str) -> Any:
 _reading = partial(damage_named, why="Its reader gave no table back", cure="Save it as CSV.")
 
 
-def _sheet_table(
-    openpyxl: Any, name: str, data: bytes, *, sheet: str | None = None, **reading: Any
-) -> TextTable:
+def _sheet_table(name: str, data: bytes, *, sheet: str | None = None, **reading: Any) -> TextTable:
     """Return a sheet of a workbook, by default the first that is visible, as text."""
+    openpyxl = installed("openpyxl", "A workbook", "tables")
     plain = _inflated(data, name)
     book = openpyxl.load_workbook(plain, read_only=True, data_only=True, keep_links=False)
     if sheet is not None and sheet not in book.sheetnames:
@@ -252,8 +249,9 @@ def _columns_in_memory(frame: Any, **reading: Any) -> FrameTable:
     return FrameTable("a table in memory", keys, rows, lambda i: frame[keys[i]], **reading)
 
 
-def _parquet_table(parquet: Any, name: str, data: bytes, **reading: Any) -> FrameTable:
+def _parquet_table(name: str, data: bytes, **reading: Any) -> FrameTable:
     """Return a Parquet file as a table; its fields may state units in their metadata."""
+    parquet = installed("pyarrow.parquet", "A Parquet", "tables")
     file = parquet.ParquetFile(io.BytesIO(data))
     heads = file.schema_arrow
     units = [
