@@ -87,10 +87,9 @@ _WIDER = f"{_WIDE}no sensor is so much wider."
 
 def require_span(scan: Scan) -> None:
     """Refuse positions over which no film is scanned, before anything is built on them."""
-    h = (scan.film or scan.set_up.film).thickness
-    lengths = _lengths(scan, h)
-    if lengths["span"] > _LONGEST_SPAN * h:
-        raise _implausible(scan, h, lengths, "The positions span", lengths["span"], _LONG)
+    lengths = _lengths(scan)
+    if lengths["span"] > _LONGEST_SPAN * lengths["thickness"]:
+        raise _implausible(scan, lengths, "The positions span", lengths["span"], _LONG)
 
 
 def require_depth(scan: Scan) -> None:
@@ -153,13 +152,12 @@ def require_plausible(scan: Scan) -> None:
     """Refuse a rod scan whose lengths no film, rod and sensor can have, and name the unit."""
     if scan.load is not None and scan.normal_load is not None:
         require_recorded(scan.load, scan.normal_load)
-    h = (scan.film or scan.set_up.film).thickness
-    lengths = _lengths(scan, h)
+    lengths = _lengths(scan)
     span = lengths["span"]
     rod_width = 2 * lengths.get("radius", 0.0)
     if rod_width > span:
         words = f"The positions span {span * 1e3:.4g} mm; the rod's width is"
-        raise _implausible(scan, h, lengths, words, rod_width, _SHORT)
+        raise _implausible(scan, lengths, words, rod_width, _SHORT)
 
     x, y = (positions.ravel() for positions in scan.positions)
     steps = places_of(x, y, scan.passes.ravel()).steps
@@ -172,29 +170,29 @@ def require_plausible(scan: Scan) -> None:
         (rod_width, 1.0, "The rod's width is", "Under such a rod the stress depends on friction."),
         (width, _WIDEST_VOLTAGE, "The voltage's width at half height is", _WIDER),
     ):
-        if length > most * h:
-            raise _implausible(scan, h, lengths, words, length, why)
+        if length > most * lengths["thickness"]:
+            raise _implausible(scan, lengths, words, length, why)
 
 
-def _lengths(scan: Scan, h: float) -> Lengths:
-    """Return the span of a scan and the radius of a rod, in m; too short a span is refused."""
+def _lengths(scan: Scan) -> Lengths:
+    """Return thickness, span and the radius of a rod, in m; too short a span is refused."""
+    h = (scan.film or scan.set_up.film).thickness
     span = max(float(np.ptp(axis)) for axis in (scan.x, scan.y) if axis is not None)
-    lengths = {"span": span}
+    lengths = {"thickness": h, "span": span}
     if isinstance(scan.indenter, Rod):
         lengths["radius"] = scan.indenter.radius
     if span < _SHORTEST_SPAN * h:
-        raise _implausible(scan, h, lengths, "The positions span", span, _SHORT)
+        raise _implausible(scan, lengths, "The positions span", span, _SHORT)
     return lengths
 
 
-def _implausible(
-    scan: Scan, h: float, lengths: Lengths, words: str, length: float, why: str
-) -> InputError:
+def _implausible(scan: Scan, lengths: Lengths, words: str, length: float, why: str) -> InputError:
     """Return the error of a length in m that no set-up has, with the units to check."""
     place = f"{scan.source.file_name}: " if scan.source else ""
+    h = lengths["thickness"]
     times = f"{length / h:.3g} times the film's thickness of {h * 1e3:.4g} mm"
     problem = f"{place}{words} {length * 1e3:.4g} mm, {times}."
-    return InputError(problem, why=why, cure=_cure(lengths, h))
+    return InputError(problem, why=why, cure=_cure(lengths))
 
 
 def rise_of(x: FloatArray, y: FloatArray, u: FloatArray) -> FloatArray:
@@ -223,41 +221,43 @@ def _voltage_width(x: FloatArray, y: FloatArray, u: FloatArray) -> float:
     return 2 * half if above[distance <= half].mean() > _CROWDED else 0.0
 
 
-def _cure(lengths: Lengths, thickness: float) -> str:
+def _cure(lengths: Lengths) -> str:
     """Name the units to check, and the values of each input that make all lengths usual ones."""
-    inputs = [
-        ("positions", "data/x", ("span", "step", "width"), 0.0),
-        ("a film thickness", "sample/film/thickness", (), thickness),
-        ("a rod radius", "indenter/radius", ("radius",), lengths.get("radius", 0.0)),
-    ]
+    inputs = {
+        "positions (/entry/data/x)": ("span", "step", "width"),
+        "a film thickness (/entry/sample/film/thickness)": ("thickness",),
+        "a rod radius (/entry/indenter/radius)": ("radius",),
+    }
     causes = []
-    for name, path, scaled, stated in inputs:
-        low, high = _usual_factors(lengths, thickness, scaled)
+    for name, scaled in inputs.items():
+        low, high = _usual_factors(lengths, scaled)
         if not 0 < low < high < np.inf:  # so of a rod that is none
             continue
+        value = "{:g} to {:g} times as large"
+        millimetres = 1.0
+        if len(scaled) == 1:
+            value = "of {:g} to {:g} mm"
+            millimetres = lengths[scaled[0]] * 1e3
         # Two digits, without a power of ten.
-        millimetres = stated * 1e3 or 1.0
-        first, last = (f"{float(f'{factor * millimetres:.2g}'):g}" for factor in (low, high))
-        value = f"of {first} to {last} mm" if stated else f"{first} to {last} times as large"
-        causes.append(f"{name} (/entry/{path}) {value}{_mistake_within(low, high)}")
+        ends = (float(f"{factor * millimetres:.2g}") for factor in (low, high))
+        causes.append(f"{name} {value.format(*ends)}{_mistake_within(low, high)}")
     if not causes:
         return "Check the units of /entry/data/x, /entry/sample/film/thickness and /entry/indenter."
     return f"Check the units. The scan would be a usual one with {'; or with '.join(causes)}."
 
 
-def _usual_factors(
-    lengths: Lengths, thickness: float, scaled: tuple[str, ...]
-) -> tuple[float, float]:
-    """Range of the factor on some of the lengths, or on the thickness, that makes all usual."""
+def _usual_factors(lengths: Lengths, scaled: tuple[str, ...]) -> tuple[float, float]:
+    """Range of the factor on some of the lengths that makes all usual, over the thickness."""
     low = 0.0
     high = np.inf
-    for name, length in lengths.items():
+    for name, limits in _USUAL.items():
+        length = lengths.get(name, 0.0)
         if length <= 0:
             continue
-        least, most = (limit * thickness / length for limit in _USUAL[name])
-        if not scaled:  # the thickness
+        least, most = (limit * lengths["thickness"] / length for limit in limits)
+        if "thickness" in scaled:
             least, most = 1 / most, 1 / least
-        elif name not in scaled:  # not changed by this input
+        elif name not in scaled:
             if least <= 1 <= most:
                 continue
             return np.inf, 0.0
