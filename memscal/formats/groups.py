@@ -253,13 +253,6 @@ def read_parameters(file: SafeFile, path: str, reading: Reading) -> ParameterSet
     )
 
 
-def estimated_record(file: SafeFile) -> Record:
-    """Return what the group of the parameters holds, by the names that the file gives them."""
-    return Record(
-        "NXcollection", tuple(map(estimated_quantity, file.text_list("/entry/parameters/names")))
-    )
-
-
 def named_collection(children: Mapping[str, Node]) -> Group:
     """Return nodes as an NXcollection; ``names`` keeps their order."""
     return Group("NXcollection", {"names": to_json(list(children)), **children})

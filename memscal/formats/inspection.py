@@ -10,7 +10,7 @@ from memscal.errors import FormatError, MemscalError
 from memscal.formats.artifact import artifact_from
 from memscal.formats.digest import altered, has_no_digest, require_schema
 from memscal.formats.files import FilePath
-from memscal.formats.groups import estimated_record, listed, origins, read_quality
+from memscal.formats.groups import listed, origins, read_quality
 from memscal.formats.hdf5 import writer
 from memscal.formats.hdf5.reader import SafeFile, open_hdf5
 from memscal.formats.reference import profile_from
@@ -19,7 +19,7 @@ from memscal.formats.stress import profile_paths, stress_from
 from memscal.formats.units import dimension_of, to_si
 from memscal.model import records
 from memscal.model.arrays import Values
-from memscal.model.quantities import Record, record
+from memscal.model.quantities import Record, estimated_quantity, record
 
 _READERS: dict[str, Callable[[SafeFile], Any]] = {
     writer.SCAN_SCHEMA: scan_from,
@@ -176,7 +176,8 @@ def _schema(file: SafeFile) -> str:
 
 
 def _layout(file: SafeFile, schema: str) -> Iterator[tuple[str, Record]]:
-    yield "/entry/parameters", estimated_record(file)
+    names = file.text_list("/entry/parameters/names")
+    yield "/entry/parameters", record("NXcollection", *map(estimated_quantity, names))
     yield from _LAYOUTS[schema].items()
     for path in profile_paths(file):
         yield path, records.STRESS_NUMBERS
