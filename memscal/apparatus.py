@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import field, fields, replace
+from dataclasses import field, replace
 from functools import cached_property
 from os import PathLike
 
@@ -476,7 +476,7 @@ def load_apparatus(path: str | PathLike[str], *, accept_altered: bool = False) -
         data = artifact_from(file)
         digest = file.attribute("/", DIGEST_ATTRIBUTE)
         source = file.source
-    apparatus = ApparatusFunction(**{item.name: getattr(data, item.name) for item in fields(data)})
+    apparatus = ApparatusFunction(**vars(data))
     object.__setattr__(apparatus, "source", source)
     # Written again, it might have another digest by rounding: the file's is kept.
     object.__setattr__(apparatus, "content_digest", str(digest))
