@@ -107,7 +107,8 @@ class NamedColumns:
         parts = self._parts(items)
         for lines, part in Task("rows", rows).counted(parts, lambda part: len(part[0])):
             self._lines_of.append(lines)
-            for item, column, numbers in zip(items, values, part, strict=True):
+            # Columns that were not asked for may follow: they were looked at.
+            for item, column, numbers in zip(items, values, part, strict=False):
                 if self._sentinels:
                     numbers = np.where(np.isin(numbers, self._sentinels), np.nan, numbers)
                 for i in np.flatnonzero(np.abs(numbers) >= _OVERLOAD):

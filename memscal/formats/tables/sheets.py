@@ -116,8 +116,7 @@ def _sheet_table(name: str, data: bytes, *, sheet: str | None = None, **reading:
     cells = 0
     for row in Task("rows", claimed).counted(chosen.iter_rows(values_only=True)):
         cells += max(len(row), 1)
-        if cells > MOST_TAGS:
-            raise too_large(name, cells, MOST_TAGS, "cells", cure="Save it as CSV.")
+        _limit(name, cells, MOST_TAGS, "cells")
         text.write("\t".join(map(_cell, row)).encode() + b"\n")
     cure = (
         f"Name the sheet of the table (--sheet): {', '.join(book.sheetnames)}. Of formulas the "

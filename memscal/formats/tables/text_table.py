@@ -307,7 +307,6 @@ class TextTable(NamedColumns):
 
     def _parts(self, wanted: list[Wanted]) -> Parts:
         indices = [self._index(item.column) for item in wanted]
-        count = len(wanted)
         rows, places = self._first
         for left, top, right, bottom in self._sheet.merged if self._sheet else ():
             if bottom >= places[0] and any(left <= i + 1 <= right for i in indices):
@@ -318,12 +317,12 @@ class TextTable(NamedColumns):
                 )
         self.others = ", ".join(self._look_at_others(indices))
         wanted = wanted + self._others
-        yield places, self._columns_of(rows, places, indices, wanted)[:count]
+        yield places, self._columns_of(rows, places, indices, wanted)
         for block in self._blocks:
             numbers = self._bare_numbers(block)
             if numbers is not None and max(indices) < self._columns:
                 self._reach = self._columns
-                yield range(self._line, self._line + len(numbers)), [*numbers.T[indices[:count]]]
+                yield range(self._line, self._line + len(numbers)), [*numbers.T[indices]]
                 self._line += len(numbers)
                 continue
             lines, comments = self._numbered(block)
@@ -331,7 +330,7 @@ class TextTable(NamedColumns):
             rows, places = self._rows(lines)
             self._require_whole(rows, places, lines)
             columns = self._columns_of(rows, places, indices, wanted)
-            yield np.array(places, dtype=np.int32), columns[:count]
+            yield np.array(places, dtype=np.int32), columns
 
     def _look_at_others(self, read: list[int]) -> Iterator[str]:
         """Yield names of columns that vary; read those that begin with numbers or units, too."""
