@@ -14,6 +14,7 @@ from memscal.cli.options import (
     FILM,
     FREE_OR_STUCK,
     LAW,
+    POSITION,
     NonNegative,
     Options,
     Quantity,
@@ -41,11 +42,7 @@ if TYPE_CHECKING:
 _SHARED = ("r_unit", "sigma", "sigma_unit", "shear", "sign", "shear_sign", "value", "solver")
 _TABLE_ONLY = ("r",)
 _MESH_ONLY = ("vertical", "base", "centre")
-_REFERENCE_NAMES = (*_TABLE_ONLY, *_SHARED, *_MESH_ONLY)
-"""The options that only a reference has."""
-
 _READING = ("sheet", "skip_rows", "missing", "delimiter", "decimal")
-_POSITION = Quantity("mm", low=-float("inf"))
 _SIGN = click.Choice(["1", "-1"])
 
 
@@ -94,21 +91,19 @@ Meshes (.vtu, .vtk, .xdmf) need the extra fem-io: pip install "memscal[fem-io]".
 """
 
 _COLUMNS = (
-    *(
-        "x",
-        "y",
-        "u",
-        "u_errors",
-        "u_xz",
-        "u_yz",
-        "load_column",
-        "depth",
-        "repeat",
-        "branch",
-        "time",
-    ),
+    "x",
+    "y",
+    "u",
+    "u_errors",
+    "u_xz",
+    "u_yz",
+    "load_column",
+    "depth",
+    "repeat",
+    "branch",
+    "time",
 )
-_OF_HOLDS = ("depth", "depth_unit", "baseline")
+_OF_HOLDS = ("depth_unit", "baseline")
 _LAYOUT = (
     "x_unit",
     "u_unit",
@@ -118,7 +113,7 @@ _LAYOUT = (
     "holds",
     "ceiling",
     "scan",
-    *_OF_HOLDS[1:],
+    *_OF_HOLDS,
 )
 _MADE = ("speed", "step")
 _CONDITIONS = ("rod_friction", "lubrication", "lubricant", "title")
@@ -147,12 +142,12 @@ _ONLY = {
         "load_scatter",
         "position_error",
         *_MADE,
-        "figures",
+        "figure",
         "laboratory",
         *_SENSOR_NAMES.values(),
         *_CELL_NAMES.values(),
     ],
-    "reference": _REFERENCE_NAMES,
+    "reference": [*_TABLE_ONLY, *_SHARED, *_MESH_ONLY],
 }
 _NEEDED = {"scan": ("x", "u"), "reference": ("sigma",)}
 _NEEDED_WITH_MESH = ("r_unit", "sigma_unit")
@@ -203,7 +198,7 @@ _NEEDED_WITH_MESH = ("r_unit", "sigma_unit")
 @option("--baseline", click.Choice(["before-each"]))(
     "Holds: the reading before each press is subtracted from it."
 )
-@option("--figure figures", out.FigurePath(), multiple=True, metavar="FILE.png|svg|pdf")(
+@option("--figure", out.FigurePath(), multiple=True, metavar="FILE.png|svg|pdf")(
     "Scan: the log with the holds that were found."
 )
 @option("--repeat", "COLUMN", multiple=True)(
@@ -306,10 +301,10 @@ _NEEDED_WITH_MESH = ("r_unit", "sigma_unit")
 @option("--vertical", click.Choice(["x", "y", "z"]))(
     "Mesh: axis across the film.  [default: the second of a section's two; z in 3-D]"
 )
-@option("--base", _POSITION)(
+@option("--base", POSITION)(
     "Mesh: position of the base on that axis, in mm.  [default: the lowest]"
 )
-@option("--centre", (_POSITION, _POSITION), metavar="MM MM")(
+@option("--centre", (POSITION, POSITION), metavar="MM MM")(
     "Mesh in 3-D: where the indenter's axis meets the base, in mm.  [default: 0 0]"
 )
 @option("--indenter", click.Choice(["rod", "sphere"]))("Shape of the indenter.  [default: rod]")
@@ -342,11 +337,11 @@ def command(
     kept in the notes of the file.
     """
     mesh = hook("is_mesh")(table)
-    given = ("repeat", "missing", "figures", "holds", "position_errors_by_repeat")
+    given = ("repeat", "missing", "figure", "holds", "position_errors_by_repeat")
     options |= {name: options[name] or None for name in given}
     _check_usage(table, kind, mesh, options)
     options |= {name: int(options[name]) for name in _SIGNS if options[name] is not None}
-    figures = options["figures"] or ()
+    figures = options["figure"] or ()
     laboratory = options["laboratory"]
     inputs = [*hook("with_drawn_in")(table), laboratory]
     out.prove_writable([output, *figures], force=force, inputs=inputs)
@@ -401,9 +396,7 @@ def _check_usage(path: Path, kind: str, mesh: bool, options: Options) -> None:
         raise click.UsageError("Give --load, or --value in its place.")
     if options["rod_friction"] is not None and options["indenter"] == "sphere":
         raise click.UsageError("--rod-friction belongs to --indenter rod.")
-    if options["figures"] is not None and options["holds"] is None:
-        raise click.UsageError("--figure belongs to --holds.")
-    of_holds = _stated(options, _OF_HOLDS)
+    of_holds = _stated(options, ("depth", *_OF_HOLDS, "figure"))
     if of_holds and options["holds"] is None:
         raise click.UsageError(f"{named(of_holds)} belong to --holds.")
     if not mesh and options["shear_sign"] is not None and options["shear"] is None:
