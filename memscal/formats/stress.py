@@ -44,18 +44,21 @@ def _read_points(file: SafeFile, name: str, of: Reading) -> dict[str, MeasuredPo
 
 
 def _read_scans(
-    file: SafeFile, paths: Sequence[str], of: Sequence[int], sources: Mapping[str, SourceFile]
+    file: SafeFile, paths: Sequence[str], of: Sequence[float], sources: Mapping[str, SourceFile]
 ) -> tuple[MeasuredScan, ...]:
     """Read the scans; ``of`` says which, from 1, the profile at each of the paths is of."""
     stored = file.json_value("/entry/scans/names", list, None)
-    size = max(of) if stored is None else len(stored)
-    if max(of) > size:
-        raise FormatError(
-            f"{file.where('/entry')}: a profile comes from scan {max(of)} of {size}.",
-            cure="Run memscal apply again.",
-        )
+    size = _MOST_SCANS if stored is None else len(stored)
+    for path, number in zip(paths, of, strict=True):
+        if not 1 <= number <= size:
+            raise FormatError(
+                f"{file.where(path)}: the profile comes from scan {number:g} of {size}.",
+                why="Scans are counted from 1.",
+                cure="Run memscal apply again.",
+            )
     scans = []
-    for i, name in enumerate(stored or [f"scan_{i}" for i in range(1, size + 1)], start=1):
+    named = stored or [f"scan_{i + 1}" for i in range(int(max(of)))]
+    for i, name in enumerate(named, start=1):
         path = f"/entry/scans/{name}"
         source = sources.get(str(name))
         if stored is not None:
@@ -134,10 +137,10 @@ def stress_from(file: SafeFile) -> MeasuredStress:
         )
     inputs = file.text_list("/entry/inputs/names")
     sources = {name: read_source(file, f"/entry/inputs/{name}") for name in inputs}
-    numbers = [_scan_number(file, path) for path in paths]
+    numbers = [file.require_scalar(f"{path}/scan", "dimensionless") for path in paths]
     scans = _read_scans(file, paths, numbers, sources)
     profiles = tuple(
-        _read_profile(file, path, scans[number - 1])
+        _read_profile(file, path, scans[int(number) - 1])
         for path, number in zip(paths, numbers, strict=True)
     )
     accepted = accepted_alterations(file.source)
@@ -202,18 +205,6 @@ def _entry(measured: MeasuredStress) -> Group:
         "process": write_record(records.PROCESS, measured.process),
     }
     return Group("NXentry", children, {"default": [*profiles][-1]})
-
-
-def _scan_number(file: SafeFile, path: str) -> int:
-    """Which scan a profile comes from, counted from one."""
-    number = file.require_scalar(f"{path}/scan", "dimensionless")
-    if not 1 <= number <= _MOST_SCANS:
-        raise FormatError(
-            f"{file.where(path)}/scan is {number:g}.",
-            why=f"Scans are counted from 1 to {_MOST_SCANS} at most.",
-            cure="Run memscal apply again.",
-        )
-    return int(number)
 
 
 def _profile_group(profile: MeasuredProfile, scans: tuple[MeasuredScan, ...]) -> Group:
