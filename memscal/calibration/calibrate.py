@@ -257,7 +257,7 @@ def calibrate(
         results, by_other_route = _propagated(solution, effects, prepared, other=other)
     done_with("uncertainties")
     assumptions = assumptions_of(solution, results, loads=prepared.reading.per == "Pa")
-    checks = quality_checks(solution, results, by_other_route, assumptions)
+    checks = tuple(quality_checks(solution, results, by_other_route, assumptions))
     checks, explanations = explained(solution, checks)
     done_with("checks")
     laws = None if relative or solution.stress.form else weigh_laws(solution)

@@ -1,7 +1,7 @@
 """Quality checks of a calibration: value, limit, and what a failure means."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from scipy.special import chdtrc, fdtri, logsumexp
@@ -67,46 +67,32 @@ def quality_checks(
     results: Results,
     other: Results | None,
     assumed: Sequence[Assumption],
-) -> tuple[QualityCheck, ...]:
+) -> Iterator[QualityCheck]:
     """Run every check that applies to the scan; ``other``: results by the other route."""
     division = results.division or (other.division if other else None)
     estimate = solution.estimate
-    checks = [
-        *_reconvolutions(solution),
-        _constraint(solution),
-        *_agreement(solution, results, division),
-        *_shape(solution, results.parameters),
-        *_field_shape(solution, results),
-        *_set_up(solution),
-        _indentation(solution, results, assumed),
-    ]
+    yield from _reconvolutions(solution)
+    yield from _constraint(solution)
+    yield from _agreement(solution, results, division)
+    yield from _shape(solution, results.parameters)
+    yield from _field_shape(solution, results)
+    yield from _set_up(solution)
+    yield from _indentation(solution, results, assumed)
     if estimate.points.u_errors is not None:
-        checks.append(quality.noise_check(estimate.weighed.noise, estimate.points.channel))
-    checks += [
-        *_unexplained(estimate, results),
-        _bayes_factor(estimate),
-        _symmetry(estimate),
-        *_steadiness(solution),
-        *_held_out(solution),
-        _saturation(estimate),
-    ]
-    return tuple(check for check in checks if check is not None)
+        yield quality.noise_check(estimate.weighed.noise, estimate.points.channel)
+    yield from _unexplained(estimate, results)
+    yield _bayes_factor(estimate)
+    yield _symmetry(estimate)
+    yield from _steadiness(solution)
+    yield from _held_out(estimate)
+    yield from _saturation(estimate)
 
 
-def _reconvolutions(solution: Solution) -> list[QualityCheck]:
+def _reconvolutions(solution: Solution) -> Iterator[QualityCheck]:
     removed = (
         "the posterior mean of G misses something that the scan shows"
         if isinstance(solution.method, Bayesian)
         else "the regularisation has removed something that the scan shows (see method bayesian)"
-    )
-    division = (
-        "Reduced chi-square of the scan against the G found, convolved with the reference. A "
-        f"failure means that {removed}, or that the scan is no convolution of the reference: "
-        "look at chi_square, which does not depend on G."
-    )
-    gaussian = (
-        "Reduced chi-square of the scan against the fitted Gaussian convolved with the reference. "
-        "A failure means that G is not Gaussian at this noise, or that something is not as stated."
     )
     fitted = solution.gaussian_misfit
     p_value = None
@@ -115,10 +101,22 @@ def _reconvolutions(solution: Solution) -> list[QualityCheck]:
     # Both are of the same points.
     limit = _misfit_limit(solution.estimate, fitted.degrees)
     chi2 = solution.deconvolution.misfit.chi2_reduced
-    return [
-        check("reconvolution", chi2, limit, division),
-        check("gaussian_misfit", fitted.chi2_reduced, limit, gaussian, p_value),
-    ]
+    yield check(
+        "reconvolution",
+        chi2,
+        limit,
+        "Reduced chi-square of the scan against the G found, convolved with the reference. A "
+        f"failure means that {removed}, or that the scan is no convolution of the reference: "
+        "look at chi_square, which does not depend on G.",
+    )
+    yield check(
+        "gaussian_misfit",
+        fitted.chi2_reduced,
+        limit,
+        "Reduced chi-square of the scan against the fitted Gaussian convolved with the reference. "
+        "A failure means that G is not Gaussian at this noise, or that something is not as stated.",
+        p_value,
+    )
 
 
 def _misfit_limit(estimate: ProfileEstimate, degrees: float) -> float:
@@ -132,12 +130,12 @@ def _misfit_limit(estimate: ProfileEstimate, degrees: float) -> float:
     return (noise.degrees + rest * largest) / degrees
 
 
-def _constraint(solution: Solution) -> QualityCheck | None:
+def _constraint(solution: Solution) -> Iterator[QualityCheck]:
     """Compare a G that was kept from falling below zero, or from rising, with the free one."""
     method = solution.method
     estimate = solution.estimate
     if not (isinstance(method, Bayesian) and method.constrained):
-        return None
+        return
     points = estimate.points
     weights = estimate.weights / estimate.noise_scale**2
     kept = points.standardised(points.u - solution.deconvolution.predicted, weights)
@@ -145,18 +143,19 @@ def _constraint(solution: Solution) -> QualityCheck | None:
     rise = np.sum(kept**2) - np.sum(free**2)
     # As many combinations of departures as the scan determines, and as a constraint may remove.
     determined = unexplained.free_model(estimate).design.shape[1] - estimate.basis.flat
-    meaning = (
+    yield check(
+        "constraint",
+        max(rise, 0.0),
+        chi_square_limit(max(determined, 1)),
         "Rise of chi-square by the constraint on G (nonnegative, monotone) over the free "
-        "estimate. A failure means that the scan contradicts it: leave it out."
+        "estimate. A failure means that the scan contradicts it: leave it out.",
     )
-    return check("constraint", max(rise, 0.0), chi_square_limit(max(determined, 1)), meaning)
 
 
 def _agreement(
     solution: Solution, results: Results, division: DivisionMap | None
-) -> list[QualityCheck]:
+) -> Iterator[QualityCheck]:
     """Compare the results of both routes, and the width of G with the one fitted to the scan."""
-    checks = []
     difference = route_difference(solution, division)
     if difference is not None:
         meaning = (
@@ -165,13 +164,8 @@ def _agreement(
             "scan shows a feature that the one follows and the other does not, or that the method "
             "failed: look at the residuals and at both G(r)."
         )
-        checks.append(check("method_agreement", difference, _ROUTES_LIMIT, meaning))
+        yield check("method_agreement", difference, _ROUTES_LIMIT, meaning)
     route = "by division of the fields" if solution.deconvolution.divided else "in data space"
-    meaning = (
-        f"Difference of the width of G {route} from the one fitted to the scan, in its standard "
-        "uncertainty. A failure means that G is not Gaussian, or something not as stated, "
-        "so that its width depends on how it is read off. Look at both reconvolutions."
-    )
     parameters = results.parameters
     i, j = (parameters.names.index(name) for name in _WIDTHS)
     covariance = parameters.covariance
@@ -181,11 +175,17 @@ def _agreement(
     variance = covariance[i, i] + covariance[j, j] - 2 * covariance[i, j] - misfit**2
     # Differences below a fifth of a percent are negligible, however small their noise.
     allowed = np.hypot(np.sqrt(max(variance, 0.0)), 0.002 * fitted)
-    checks.append(check("width_agreement", abs(deconvolved - fitted) / allowed, 3.0, meaning))
-    return checks
+    yield check(
+        "width_agreement",
+        abs(deconvolved - fitted) / allowed,
+        3.0,
+        f"Difference of the width of G {route} from the one fitted to the scan, in its standard "
+        "uncertainty. A failure means that G is not Gaussian, or something not as stated, "
+        "so that its width depends on how it is read off. Look at both reconvolutions.",
+    )
 
 
-def _shape(solution: Solution, parameters: ParameterSet) -> list[QualityCheck]:
+def _shape(solution: Solution, parameters: ParameterSet) -> Iterator[QualityCheck]:
     """Look for what divisions that went wrong do to G: spikes, lobes and ripples."""
     estimate = solution.estimate
     deconvolution = solution.deconvolution
@@ -200,37 +200,40 @@ def _shape(solution: Solution, parameters: ParameterSet) -> list[QualityCheck]:
     end = max(solution.band.resolved, solution.band.relevant, 2 / estimate.gaussian.sigma)
     rough = float(power[k > _BEYOND * end].sum() / power.sum())
     cure = "take method white-noise or bayesian, or more regularisation"
-    spike = (
+    # 2.5 by simulation, docs/checks.md: beyond sound results, in which G may be a disc or a ring.
+    yield check(
+        "shape_width",
+        widest,
+        2.5,
         "Full width at half maximum of the deconvolved G over that of a Gaussian, of the one "
         "fitted to the scan or the one nearest to G, or the inverse, whichever is largest. A "
-        f"failure means that G is a spike, or has lobes far out: {cure}."
+        f"failure means that G is a spike, or has lobes far out: {cure}.",
     )
-    ripples = (
+    yield check(
+        "shape_negative",
+        negative,
+        0.4,
         "Share of the integral of |G| over its support where G is negative. A failure means "
-        f"that G consists of ripples: {cure}."
+        f"that G consists of ripples: {cure}.",
     )
-    noise = (
+    yield check(
+        "shape_roughness",
+        rough,
+        0.1,
         f"Share of the power of G at wavenumbers beyond {_BEYOND * end * 1e-3:.3g} rad/mm, "
         f"{_BEYOND:g} times those that the scan determines. A failure means that G's detail is "
-        f"noise: {cure}."
+        f"noise: {cure}.",
     )
-    # 2.5 by simulation, docs/checks.md: beyond sound results, in which G may be a disc or a ring.
-    return [
-        check("shape_width", widest, 2.5, spike),
-        check("shape_negative", negative, 0.4, ripples),
-        check("shape_roughness", rough, 0.1, noise),
-    ]
 
 
-def _field_shape(solution: Solution, results: Results) -> list[QualityCheck]:
+def _field_shape(solution: Solution, results: Results) -> Iterator[QualityCheck]:
     """Look over the plane, of a raster, for lobes of G and for residuals that are no noise."""
     fields = solution.fields
     estimate = solution.estimate
     points = estimate.points
     if not isinstance(fields, RasterFields) or not fields.index[0].size:
-        return []
+        return
     g = solution.deconvolution.g.image
-    checks = []
     if results.field_errors is not None:
         # Farther out G is tapered to zero.
         inside = solution.deconvolution.g.grid.radius < fields.support / 2
@@ -240,62 +243,67 @@ def _field_shape(solution: Solution, results: Results) -> list[QualityCheck]:
             "uncertainties, over the largest G. A failure means that G has ripples that its "
             "uncertainty does not count: look at the field of G, and take method bayesian."
         )
-        checks.append(check("field_lobes", max(lobe, 0.0), _LOBE, meaning))
+        yield check("field_lobes", max(lobe, 0.0), _LOBE, meaning)
     weight = estimate.outlier_weight
     left = weight * (points.u - estimate.predicted)
     noise = solution.band.excess * weight**0.5 * estimate.noise
     degrees = estimate.raster_noise.degrees if estimate.raster_noise else _WELL_KNOWN
     worst = unexplained.ring_test(left, noise, fields.index, degrees)
-    meaning = (
+    yield _tested(
+        "field_residuals",
+        worst,
         "Power of the Bayesian fit's residuals over the plane in one ring of wavenumbers, over "
         "that of the noise: the ring where chance makes it least likely. A failure means that the "
         "form of G leaves a structure of the scan, and that the baseline, with it A, is drawn "
         "along: a sensor or reference of another form, or an error that neighbours share. Look "
-        "at the map of the residuals."
+        "at the map of the residuals.",
     )
-    checks.append(_tested("field_residuals", worst, meaning))
-    return checks
 
 
-def _set_up(solution: Solution) -> list[QualityCheck]:
+def _set_up(solution: Solution) -> Iterator[QualityCheck]:
     """Film, band, reach, baseline, force and outliers."""
     estimate = solution.estimate
     points = estimate.points
     film = solution.scan.film
     sigma = estimate.gaussian.sigma
     source = solution.stress.form is not None
-    checks = []
     if film is not None and not source:
         meaning = (
             "Width of G over the film's thickness. A failure means that the unit of the positions "
             "or of the film's thickness should be looked at."
         )
-        checks.append(check("width_over_thickness", sigma / film.thickness, 3.0, meaning))
+        yield check("width_over_thickness", sigma / film.thickness, 3.0, meaning)
     resolved = solution.band.resolved
-    meaning = (
+    left = gaussian_transfer(np.array(resolved), sigma)
+    yield check(
+        "resolved_band",
+        float(left),
+        0.5,
         "Transfer function of the fitted Gaussian at the resolved wavenumber, here "
         f"{resolved * 1e-3:.3g} rad/mm: up to there, the posterior standard uncertainty of "
         f"G's transfer function is less than 1/{RESOLVED:g} of it, whatever the method of "
         "division; beyond, G is determined by the prior. A failure means that noise hides more "
-        "than half of G's spectrum: average repeats or raise the load."
-    )
-    left = gaussian_transfer(np.array(resolved), sigma)
-    checks.append(check("resolved_band", float(left), 0.5, meaning))
-    meaning = (
-        "Share of the voltage's integral that lies beyond the scan and is extrapolated. A failure "
-        "means that A rests on the extrapolation: scan farther."
+        "than half of G's spectrum: average repeats or raise the load.",
     )
     # A shear falls off more slowly: of the paper's rod 6.5 % lie beyond four film thicknesses.
     most = 0.10 if points.order else 0.05
-    checks.append(check("tail_share", solution.tail_share, most, meaning))
-    meaning = (
-        "Change of the baseline across the scan over the largest signal. It is fitted and removed "
-        "as a line that is straight or a little curved; a failure means that what is left of it "
-        "may bias A."
+    yield check(
+        "tail_share",
+        solution.tail_share,
+        most,
+        "Share of the voltage's integral that lies beyond the scan and is extrapolated. A failure "
+        "means that A rests on the extrapolation: scan farther.",
     )
     last = 1 + int(points.free[0].sum())
     change = 2 * np.abs(estimate.drifts[1:last]).max() / estimate.largest_signal
-    checks.append(check("baseline_drift", change, 0.05, meaning))
+    yield check(
+        "baseline_drift",
+        change,
+        0.05,
+        "Change of the baseline across the scan over the largest signal. It is fitted and removed "
+        "as a line that is straight or a little curved; a failure means that what is left of it "
+        "may bias A.",
+    )
     count = points.curved.size
     if count:
         meaning = (
@@ -308,7 +316,7 @@ def _set_up(solution: Solution) -> list[QualityCheck]:
         # What a mean has of the prior's variance the posterior has not.
         found = prior - np.diag(estimate.weighed.covariance)[points.curvatures]
         share = np.abs(estimate.drifts[-count:]) / np.sqrt(np.maximum(found, _LEAST_FOUND * prior))
-        checks.append(check("baseline_curvature", share.max(), _CURVED, meaning))
+        yield check("baseline_curvature", share.max(), _CURVED, meaning)
     if not source:
         meaning = (
             "Relative difference of the reference's total force from the load. A failure means "
@@ -316,18 +324,17 @@ def _set_up(solution: Solution) -> list[QualityCheck]:
             "wrong by as much."
         )
         force = carried_force(solution.stress, estimate.model.reference)
-        checks.append(check("reference_force", abs(force - 1.0), 0.01, meaning))
-    named = "the points that the messages name"
-    return [*checks, quality.outlier_check(estimate.outlier_weight, named)]
+        yield check("reference_force", abs(force - 1.0), 0.01, meaning)
+    yield quality.outlier_check(estimate.outlier_weight, "the points that the messages name")
 
 
 def _indentation(
     solution: Solution, results: Results, assumed: Sequence[Assumption]
-) -> QualityCheck | None:
+) -> Iterator[QualityCheck]:
     """Compare what a film's law would change, where nothing is counted for it, with u."""
     film = solution.scan.film
     if film is None or film.law not in ("", LINEAR) or "model_form" in results.changes:
-        return None
+        return
     laws = [assumption.sizes for assumption in assumed if assumption.name == "film_law"]
     if laws:
         change = max(1 / laws[0][name] for name in ("conversion_constant", "gaussian_sigma"))
@@ -339,20 +346,22 @@ def _indentation(
             depths.append(depth / scan.set_up.film.thickness)
         change = max(depths) / _DEEP
         words = f"Depth of the rod over {_DEEP:.0%} of the film's thickness."
-    meaning = (
+    yield check(
+        "indentation",
+        change,
+        1.0,
         f"{words} A failure means that a film that is taken as linear elastic, of which nothing is "
         "counted, is strained too far for that: give its law (film/law, --film-law), or leave it "
-        "out to have the law's form counted, or calibrate at a lighter load."
+        "out to have the law's form counted, or calibrate at a lighter load.",
     )
-    return check("indentation", change, 1.0, meaning)
 
 
-def _unexplained(estimate: ProfileEstimate, results: Results) -> list[QualityCheck]:
+def _unexplained(estimate: ProfileEstimate, results: Results) -> Iterator[QualityCheck]:
     """Test what no G explains: its size against the noise, and its order along the scan."""
     model = unexplained.free_model(estimate)
     residuals = unexplained.residuals_of(estimate, model)
     if residuals.degrees < FEWEST_RESIDUALS:
-        return []
+        return
     outcome: TestOutcome | None
     if residuals.stated:
         outcome = unexplained.chi_square_test(residuals)
@@ -362,15 +371,15 @@ def _unexplained(estimate: ProfileEstimate, results: Results) -> list[QualityChe
         outcome = unexplained.pure_error_test(estimate, model)
         compared = "with the scatter of repeats, as no noise is stated: an F ratio"
         noise = ""
-    checks = []
     if outcome is not None:
-        meaning = (
+        yield _tested(
+            "chi_square",
+            outcome,
             f"What no radial G can explain of the scan, compared {compared}. A failure means that "
             f"{noise}the scan is no convolution of this reference with a radial G: check the rod's "
             "radius, the film's thickness and Poisson's ratio, a baseline that is no straight "
-            "line, and the positions; every uncertainty is doubtful until then."
+            "line, and the positions; every uncertainty is doubtful until then.",
         )
-        checks.append(_tested("chi_square", outcome, meaning))
     cause = (
         "a baseline that steps or bends, a wrong reference, or noise that is correlated from point "
         "to point (a slow amplifier, creep, temperature). Look at the residual; state a known "
@@ -379,19 +388,20 @@ def _unexplained(estimate: ProfileEstimate, results: Results) -> list[QualityChe
     cause += "." if estimate.slow else "; uncertainties are too small until then."
     slow = estimate.slow or slow_noise(estimate, residuals)
     found = f" {slow_noise_text(estimate, slow, results)}" if slow else ""
-    stepped = (
+    neighbours = unexplained.neighbour_correlation_test(residuals)
+    yield _tested(
+        "residual_steps",
+        unexplained.steps_test(residuals),
         "Largest step of the residuals along the scan, in standard deviations. A failure means "
-        f"that readings changed from one point on by what no radial G explains: {cause}"
+        f"that readings changed from one point on by what no radial G explains: {cause}",
     )
-    alike = (
+    yield _tested(
+        "residual_correlation",
+        neighbours,
         "Correlation of each residual with its neighbours along the scan, halved for each step "
         f"farther, over what chance gives on average. A failure means that residuals are "
-        f"alike: {cause}{found}"
+        f"alike: {cause}{found}",
     )
-    neighbours = unexplained.neighbour_correlation_test(residuals)
-    checks.append(_tested("residual_steps", unexplained.steps_test(residuals), stepped))
-    checks.append(_tested("residual_correlation", neighbours, alike))
-    return checks
 
 
 def _tested(name: str, outcome: TestOutcome, meaning: str) -> QualityCheck:
@@ -408,14 +418,16 @@ def _bayes_factor(estimate: ProfileEstimate) -> QualityCheck:
             kinds[hypothesis.kind] = kinds.get(hypothesis.kind, 0.0) + float(departure)
     kind = max(kinds, key=lambda name: kinds[name])
     share = kinds[kind] / max(sum(kinds.values()), 1e-300)
-    meaning = (
+    value = float(departed - weighed.log_marginals[0])
+    return check(
+        "gaussian_evidence",
+        value,
+        _LOG_BAYES_LIMIT,
         "Natural logarithm of the Bayes factor for a departure of G from a Gaussian; below "
         "zero it is in favour of the Gaussian, and gaussian_sigma may be used. A failure "
         "means that G is not Gaussian, or that something is not as stated. The most probable "
-        f"departure is {_KINDS[kind]} ({share:.0%} of them)."
+        f"departure is {_KINDS[kind]} ({share:.0%} of them).",
     )
-    value = float(departed - weighed.log_marginals[0])
-    return check("gaussian_evidence", value, _LOG_BAYES_LIMIT, meaning)
 
 
 def _symmetry(estimate: ProfileEstimate) -> QualityCheck:
@@ -435,18 +447,19 @@ def _symmetry(estimate: ProfileEstimate) -> QualityCheck:
         parity = "even"
         failure = " by more than their sign: cross-talk of the normal stress, "
         failure += "a tilted rod, or an uneven film"
-    meaning = (
+    return added_check(
+        "symmetry",
+        extra.fall,
+        extra.count,
         f"Fall of chi-square by {extra.count} {parity} columns, which then make up "
         f"{extra.size:.2%} of the largest signal. A failure means that the left and right halves "
-        f"differ{failure}."
+        f"differ{failure}.",
     )
-    return added_check("symmetry", extra.fall, extra.count, meaning)
 
 
-def _steadiness(solution: Solution) -> list[QualityCheck]:
+def _steadiness(solution: Solution) -> Iterator[QualityCheck]:
     """Test whether A, centre and baseline are the same at all loads, branches and repeats."""
     estimate = solution.estimate
-    checks = []
     linear = model_tests.linearity_test(estimate)
     if linear is not None:
         meaning = (
@@ -454,8 +467,9 @@ def _steadiness(solution: Solution) -> list[QualityCheck]:
             f"{float(linear.coefficients[0]):.2%} per mean load. A failure means that the output "
             "is not linear in the load, and that one A does not serve all loads."
         )
-        checks.append(added_check("load_linearity", linear.fall, linear.count, meaning))
-    checks += [*_hysteresis(solution), *_runs(solution)]
+        yield added_check("load_linearity", linear.fall, linear.count, meaning)
+    yield from _hysteresis(estimate)
+    yield from _runs(estimate)
     apart = solution.apart
     if apart is not None and not solution.per_repeat:
         meaning = (
@@ -464,16 +478,14 @@ def _steadiness(solution: Solution) -> list[QualityCheck]:
             "failure means that stage or sensor moved from repeat to repeat, and that the one "
             "centre widens G: take a centre per repeat (--centre per-repeat)."
         )
-        checks.append(_tested("repeat_centres", apart, meaning))
-    return checks
+        yield _tested("repeat_centres", apart, meaning)
 
 
-def _hysteresis(solution: Solution) -> list[QualityCheck]:
+def _hysteresis(estimate: ProfileEstimate) -> Iterator[QualityCheck]:
     """Compare approach with retreat where scans say which is which."""
-    estimate = solution.estimate
     branches = hysteresis_test(estimate)
     if branches is None:
-        return []
+        return
     reading = estimate.points.reading
     units = (
         ("A", 1e-2, "%"),
@@ -485,75 +497,76 @@ def _hysteresis(solution: Solution) -> list[QualityCheck]:
     each = zip(units, branches.values, branches.errors, strict=False)
     for (name, scale, unit), value, error in each:
         differences.append(f"of {name} by {format_measured(value / scale, error / scale, unit)}")
-    meaning = (
+    yield _tested(
+        "hysteresis",
+        branches.outcome,
         "Differences between approach and retreat over the scatter that is left: an F ratio. They "
         f"differ (approach less retreat): {', '.join(differences)}. A failure means that A and G "
         "are means over two different scans. Scan at another speed: a difference that grows with "
         "the speed is creep of the film or a slow amplifier, of which a longer wait before each "
         "reading rids; one that does not is play of the stage (backlash), or a film that adheres: "
-        "move to each position from the same side. Or calibrate with one branch alone."
+        "move to each position from the same side. Or calibrate with one branch alone.",
     )
-    return [_tested("hysteresis", branches.outcome, meaning)]
 
 
-def _runs(solution: Solution) -> list[QualityCheck]:
+def _runs(estimate: ProfileEstimate) -> Iterator[QualityCheck]:
     """Compare the offset and the noise of each repeat and scan with those of the others."""
-    estimate = solution.estimate
     runs = compare_runs(estimate)
     if runs is None:
-        return []
+        return
     reading = estimate.points.reading
     largest = estimate.largest_signal
     distance = runs.distance / reading.scale
     apart = format_measured(distance, runs.error / reading.scale, reading.unit)
-    meaning = (
+    limit = max(_OFFSET, runs.offset.limit**0.5 * runs.error / largest)
+    yield check(
+        "offset_agreement",
+        abs(runs.distance) / largest,
+        limit,
         "Difference of a baseline from those of all other repeats of all scans, over the largest "
         f"signal: that of number {runs.moved + 1} of {runs.count} is off by {apart}. A failure "
         "means that the sensor's offset moved between them, beyond chance: let it warm up, and "
         "read it without the indenter before each run. A baseline of its own (scans have it, "
-        "repeats by --centre per-repeat) takes that up, but not what else moved."
-    )
-    limit = max(_OFFSET, runs.offset.limit**0.5 * runs.error / largest)
-    offset = check(
-        "offset_agreement", abs(runs.distance) / largest, limit, meaning, runs.offset.p_value
+        "repeats by --centre per-repeat) takes that up, but not what else moved.",
+        runs.offset.p_value,
     )
     stated = "" if estimate.points.u_errors is None else ", each over what is stated"
-    meaning = (
+    limit = max(quality.NOISE_LIMIT, runs.noise.limit**0.5)
+    ratio = runs.noise.value**0.5
+    yield check(
+        "noise_agreement",
+        ratio,
+        limit,
         f"Ratio of the scatter of one repeat of a scan to that of all others{stated}, or back: "
         f"number {runs.noisy + 1} of {runs.count} has {'more' if runs.louder else 'less'}. A "
         "failure means that their noise differs beyond chance, so that weights and uncertainties "
-        "are wrong: look for its cause, or state the noise of each (u_zz_errors)."
+        "are wrong: look for its cause, or state the noise of each (u_zz_errors).",
+        runs.noise.p_value,
     )
-    limit = max(quality.NOISE_LIMIT, runs.noise.limit**0.5)
-    ratio = runs.noise.value**0.5
-    return [offset, check("noise_agreement", ratio, limit, meaning, runs.noise.p_value)]
 
 
-def _held_out(solution: Solution) -> list[QualityCheck | None]:
+def _held_out(estimate: ProfileEstimate) -> Iterator[QualityCheck]:
     """Predict each repeat, load and scan from the others, whichever there are several of."""
-    estimate = solution.estimate
     groups = {
         "scan": estimate.points.owner,
         "load": model_tests.load_groups(estimate.points.load),
         "repeat": estimate.points.repeat,
     }
-    checks = []
-    held_out = set()
+    held_out: dict[bytes, str] = {}
     for what, group in groups.items():
         # Where every repeat has a load, or a scan, of its own, it is held out under that name.
         # Groupings are equal if the first point of each point's group is the same.
         _, first, index = np.unique(group, return_index=True, return_inverse=True)
-        grouping = first[index].tobytes()
-        if first.size > 1 and grouping not in held_out:
-            checks.append(_prediction(estimate, what, group))
-        held_out.add(grouping)
-    return checks[::-1]
+        if first.size > 1:
+            held_out.setdefault(first[index].tobytes(), what)
+    for what in reversed(held_out.values()):
+        yield from _prediction(estimate, what, groups[what])
 
 
-def _prediction(estimate: ProfileEstimate, what: str, group: IndexArray) -> QualityCheck | None:
+def _prediction(estimate: ProfileEstimate, what: str, group: IndexArray) -> Iterator[QualityCheck]:
     worst = model_tests.hold_out(estimate, group)
     if worst is None:
-        return None
+        return
     causes = {
         "repeat": "something changed between repeats: the load, the contact, the sensor; look at "
         "this repeat, and leave it out if its reason is known",
@@ -565,19 +578,20 @@ def _prediction(estimate: ProfileEstimate, what: str, group: IndexArray) -> Qual
     stated = estimate.points.u_errors is not None
     scale = "" if stated else ", over the others' own scatter as no noise is stated"
     joined = "" if worst.alone else f", {what}s taken several at a time"
-    meaning = (
+    yield _tested(
+        f"held_out_{what}",
+        worst,
         f"Chi-square per degree of one {what}'s voltages against their prediction from the others, "
         f"with the uncertainty of both{scale}; the worst of {worst.folds}, number {worst.worst + 1}"
         f"{joined}. Its own baseline, drift and centre are fitted to it. A failure means that "
-        f"{causes[what]}."
+        f"{causes[what]}.",
     )
-    return _tested(f"held_out_{what}", worst, meaning)
 
 
-def _saturation(estimate: ProfileEstimate) -> QualityCheck | None:
+def _saturation(estimate: ProfileEstimate) -> Iterator[QualityCheck]:
     points = estimate.points
     if estimate.points.order:
-        return None
+        return
     clipped = np.flatnonzero(model_tests.clipped_points(estimate))
     where = ""
     if clipped.size:
@@ -586,10 +600,12 @@ def _saturation(estimate: ProfileEstimate) -> QualityCheck | None:
         where = f", here at {'; '.join(places)} mm"
         if clipped.size > _MOST_NAMED:
             where += f" and {clipped.size - _MOST_NAMED} more"
-    meaning = (
+    yield check(
+        "saturation",
+        clipped.size,
+        0.0,
         f"Number of points at a ceiling{where}: the highest agree far better than the fit has them "
         "differ, or the profile through the other points rises above them. A failure means that "
         "amplifier or converter is saturated, and A and G are wrong: leave the points out (memscal "
-        "import --ceiling VALUE), or lower gain or load and scan again."
+        "import --ceiling VALUE), or lower gain or load and scan again.",
     )
-    return check("saturation", clipped.size, 0.0, meaning)

@@ -239,8 +239,10 @@ def require_free(
         )
     films = {scan.film for scan in scans}
     if len(films) > len(_NODES):
-        problem = f"The scans have {len(films)} films of unknown thickness."
-        raise InputError(problem, cure=f"Give scans on at most {len(_NODES)} films.")
+        raise InputError(
+            f"The scans have {len(films)} films of unknown thickness.",
+            cure=f"Give scans on at most {len(_NODES)} films.",
+        )
     if not all(scan.set_up.film.thickness_uncertainty for scan in scans):
         raise InputError(
             "A film states no uncertainty of its thickness.",
@@ -250,9 +252,11 @@ def require_free(
         )
     references = [*stated, *(scan.reference for scan in scans)]
     if any(reference is not None for reference in references):
-        why = "To estimate the thickness the rod is solved on films of others."
-        cure = "Leave the reference out, of the scan's file as well."
-        raise InputError("A reference is given, of one thickness.", why=why, cure=cure)
+        raise InputError(
+            "A reference is given, of one thickness.",
+            why="To estimate the thickness the rod is solved on films of others.",
+            cure="Leave the reference out, of the scan's file as well.",
+        )
 
 
 def free_thickness(solution: Solution) -> FreeThickness:

@@ -85,8 +85,10 @@ class Prepared:
 def prepare(as_stated: Sequence[Scan], request: Request) -> Prepared:
     """Read and solve the references, and hold them against the scans."""
     if request.centre not in (None, COMMON, PER_REPEAT):
-        problem = f"There is no choice of centre {request.centre!r}."
-        raise InputError(problem, cure=f"Give {COMMON!r} or {PER_REPEAT!r}, or leave it out.")
+        raise InputError(
+            f"There is no choice of centre {request.centre!r}.",
+            cure=f"Give {COMMON!r} or {PER_REPEAT!r}, or leave it out.",
+        )
     require_size(as_stated)
     if request.reference is None:
         as_stated = tuple(chain(*map(crossed_lines, as_stated)))
@@ -143,9 +145,11 @@ def _with_law(scan: Scan, reference: BaseStress | None, request: Request) -> Sca
     law = request.film_law
     if law is not None:
         if reference is not None:
-            why = "A reference has been calculated by a law already."
-            cure = "Give one of them (film_law, --film-law; reference, --reference)."
-            raise InputError(f"A film law ({law}) and a reference are given.", why=why, cure=cure)
+            raise InputError(
+                f"A film law ({law}) and a reference are given.",
+                why="A reference has been calculated by a law already.",
+                cure="Give one of them (film_law, --film-law; reference, --reference).",
+            )
         ratio = request.mooney_rivlin_ratio
         film = replace(scan.set_up.film, law=law, mooney_rivlin_ratio=ratio)
         scan = replace(scan, film=film, reference=None)
@@ -191,9 +195,10 @@ def _references(
     if isinstance(reference, Sequence) and not isinstance(reference, str):
         if len(reference) != len(scans):
             count = "is one scan" if len(scans) == 1 else f"are {len(scans)} scans"
-            problem = f"{len(reference)} references were given, but there {count}."
-            cure = "Give one for each scan, in their order, or one for all."
-            raise InputError(problem, cure=cure)
+            raise InputError(
+                f"{len(reference)} references were given, but there {count}.",
+                cure="Give one for each scan, in their order, or one for all.",
+            )
         return [_read(item, strength, request) for item in reference]
     return [_read(reference, strength, request)] * len(scans)
 

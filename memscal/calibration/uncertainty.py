@@ -184,9 +184,11 @@ def correlation_matrix(
     matrix = np.eye(len(sources))
     for pair, coefficient in correlations.items():
         if any(name not in sources for name in pair) or len(set(pair)) != 2:
-            problem = f"A correlation is given for {' and '.join(map(repr, pair))}."
-            why = "It must be between two inputs whose uncertainty is stated."
-            raise InputError(problem, why=why, cure=f"Choose from {', '.join(sources) or 'none'}.")
+            raise InputError(
+                f"A correlation is given for {' and '.join(map(repr, pair))}.",
+                why="It must be between two inputs whose uncertainty is stated.",
+                cure=f"Choose from {', '.join(sources) or 'none'}.",
+            )
         if not -1 <= coefficient <= 1:
             names = " and ".join(pair)
             raise InputError(f"The correlation of {names} is {coefficient:g}, outside -1 to 1.")

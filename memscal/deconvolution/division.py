@@ -253,8 +253,10 @@ def create_regulariser(name: str, /, **options: Any) -> Method:
         options = {key: value for key, value in options.items() if key != "seed"}
     unknown = sorted(set(options) - set(accepted))
     if unknown and not any(p.kind is p.VAR_KEYWORD for p in accepted.values()):
-        problem = f"Method {name} has no option {', '.join(unknown)}."
-        raise InputError(problem, cure=f"Its options are: {', '.join(accepted) or 'none'}.")
+        raise InputError(
+            f"Method {name} has no option {', '.join(unknown)}.",
+            cure=f"Its options are: {', '.join(accepted) or 'none'}.",
+        )
     method: Method = factory(**options)
     return method
 
@@ -265,8 +267,10 @@ def chosen_method(method: str | Method, options: Mapping[str, Any], **seed: int)
         return create_regulariser(method, **seed, **options)
     divides = isinstance(method, Bayesian) or callable(getattr(method, "divide", None))
     if isinstance(method, type) or not divides:
-        cure = "Give a method's name, or a regulariser that is set up: Tikhonov(), not Tikhonov."
-        raise InputError(f"The method is {method!r}, which cannot divide fields.", cure=cure)
+        raise InputError(
+            f"The method is {method!r}, which cannot divide fields.",
+            cure="Give a method's name, or a regulariser that is set up: Tikhonov(), not Tikhonov.",
+        )
     if options:
         raise InputError(
             f"Options {', '.join(options)} were given beside a regulariser that is set up already.",

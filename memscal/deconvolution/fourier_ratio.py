@@ -169,9 +169,10 @@ def lift(r: FloatArray, profile: FloatArray, spacing: float, extent: float) -> F
     if r[0] < 0:
         raise InputError(f"r begins at {r[0]:g} m.", cure="Give radii from the axis outward.")
     if not 0 < spacing < extent <= _MOST_POINTS * spacing:
-        problem = f"A field of half side {extent:g} m cannot have points {spacing:g} m apart."
-        cure = f"Give both in m: the extent is one to {_MOST_POINTS} times the spacing."
-        raise InputError(problem, cure=cure)
+        raise InputError(
+            f"A field of half side {extent:g} m cannot have points {spacing:g} m apart.",
+            cure=f"Give both in m: the extent is one to {_MOST_POINTS} times the spacing.",
+        )
     spline = radial_spline(r, profile)
 
     def continued(radius: FloatArray) -> FloatArray:
@@ -282,9 +283,11 @@ def normalise(quotient: Field) -> tuple[float, Field]:
     """
     a = quotient.grid.integrate(quotient.values)
     if not a > 0:
-        problem = f"The quotient of the fields adds up to {a:.3g} V/Pa."
-        cure = "Look at the deconvolved field; choose another method or less regularisation."
-        raise FitError(problem, why="A conversion constant is positive.", cure=cure)
+        raise FitError(
+            f"The quotient of the fields adds up to {a:.3g} V/Pa.",
+            why="A conversion constant is positive.",
+            cure="Look at the deconvolved field; choose another method or less regularisation.",
+        )
     return a, Field(quotient.grid, quotient.values / a)
 
 
@@ -326,5 +329,7 @@ def reconvolve(a: float, g: Field, stress: Field) -> Field:
 
 def _require_one_grid(first: Field, second: Field) -> None:
     if not all(map(np.array_equal, first.grid.axes, second.grid.axes)):
-        problem = f"The two fields, {first!r} and {second!r}, lie on different grids."
-        raise InputError(problem, cure="Lift both with one spacing and one extent.")
+        raise InputError(
+            f"The two fields, {first!r} and {second!r}, lie on different grids.",
+            cure="Lift both with one spacing and one extent.",
+        )

@@ -52,13 +52,16 @@ def stress_checks(
     for number, (profile, others) in enumerate(zip(profiles, restored, strict=True), start=1):
         allowed = math.hypot(*_relative(profile).values(), restore.NEGLIGIBLE_FORCE)
         off = abs(profile.force / profile.load - 1) / allowed
-        difference = (
+        p_value = math.erfc(off / math.sqrt(2))
+        force = check(
+            "applied_force",
+            off,
+            restore.FORCE_LIMIT,
             f"Difference of the profile's total force, {profile.force:.4g} N, from the applied "
             f"load of {profile.load:.4g} N, over its standard uncertainty of "
-            f"{allowed * profile.load:.2g} N. {_FORCE}"
+            f"{allowed * profile.load:.2g} N. {_FORCE}",
+            p_value,
         )
-        p_value = math.erfc(off / math.sqrt(2))
-        force = check("applied_force", off, restore.FORCE_LIMIT, difference, p_value)
         for own in (force, *others):
             meaning = f"{profile.label}: {own.meaning}"
             checks.append(replace(own, name=f"{own.name}_{number}", meaning=meaning))
@@ -92,13 +95,16 @@ def check_of_all_forces(profiles: Sequence[MeasuredProfile]) -> QualityCheck:
     mean, spread = pooled_force(profiles)
     allowed = math.hypot(spread, _NEGLIGIBLE_MEAN)
     off = abs(mean - 1) / allowed
-    meaning = (
+    # One check of all profiles together may be stricter than one for each.
+    return check(
+        "applied_force_all",
+        off,
+        2.0,
         f"Total force over applied load, the weighted mean of {len(profiles)} profiles: "
         f"{mean:.4f}, with a standard uncertainty of {allowed:.2g}, in units of which its "
-        f"difference from one is counted. {_FORCE}{_BLIND}"
+        f"difference from one is counted. {_FORCE}{_BLIND}",
+        math.erfc(off / math.sqrt(2)),
     )
-    # One check of all profiles together may be stricter than one for each.
-    return check("applied_force_all", off, 2.0, meaning, math.erfc(off / math.sqrt(2)))
 
 
 #: Messages of a restoration that the measured stress gives itself.
@@ -174,8 +180,11 @@ def measure_stress(
     for single in chain(*singles):
         restore.require_contact_size(single)
         if single.u_zz_correlation is not None:
-            why = "Their noise is correlated: of each load two matrices over them are kept."
-            restore.require_contact_size(single, MOST_OF_CORRELATED_CONTACT, why)
+            restore.require_contact_size(
+                single,
+                MOST_OF_CORRELATED_CONTACT,
+                "Their noise is correlated: of each load two matrices over them are kept.",
+            )
     loads = _measured_loads(origins, singles, sensor)
     measured = Task("loads", sum(map(len, singles))).counted(loads)
     profiles, restored, notes = zip(*measured, strict=True)
@@ -265,8 +274,9 @@ def _measure(
         if scan.y is None:
             top = np.nanargmax(np.nanmedian(scan.u_zz.reshape(-1, scan.x.size), axis=0))
             one_load.require_ends(scan, signal, np.full(2, scan.x[top]))
-        problem = f"{restore.load_of(scan)}: {failure.problem}"
-        raise type(failure)(problem, why=failure.why, cure=failure.cure) from failure
+        raise type(failure)(
+            f"{restore.load_of(scan)}: {failure.problem}", why=failure.why, cure=failure.cure
+        ) from failure
     one_load.require_ends(scan, signal, restored.centre)
     profile = one_load.measured_profile(origin, scan, prepared.electronic, restored, signal)
     checks = [check for check in restored.checks if check.name != _REPLACED]
@@ -311,8 +321,10 @@ def _profile_messages(
     others = [n for n in STATED_ERRORS[2:] if getattr(scan, f"{n}_uncertainty")]
     if others:
         names = ", ".join(others).replace("_", " ")
-        text = f"Uncertainties that the scan states count in a calibration only: {names}."
-        yield Message("statement_unused", text)
+        yield Message(
+            "statement_unused",
+            f"Uncertainties that the scan states count in a calibration only: {names}.",
+        )
     if not scan.lubrication:
         yield Message("lubrication_unstated", "The scan does not state its lubrication.")
     for message in restored.messages:

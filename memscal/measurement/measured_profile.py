@@ -133,9 +133,11 @@ def require_points(scan: Scan, signal: ContactSignal) -> None:
     if scan.normal_load is not None:
         complete &= np.isfinite(scan.normal_load)
     if not complete.any():
-        problem = f"{load_of(scan)}: all {complete.size} points are missing (NaN)."
-        cure = "Check the import, or leave the lines of that load out."
-        raise InputError(problem, why="A load without voltages has no profile.", cure=cure)
+        raise InputError(
+            f"{load_of(scan)}: all {complete.size} points are missing (NaN).",
+            why="A load without voltages has no profile.",
+            cure="Check the import, or leave the lines of that load out.",
+        )
     if scan.y is not None:
         return
     order = np.argsort(scan.x)

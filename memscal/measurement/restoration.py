@@ -233,8 +233,10 @@ class Restoration(Result, Checked):
             expected = read_reference(expected)
         if isinstance(expected, StressProfile | Contact):
             return _compared(self, expected)
-        cure = "Give a contact from memscal.indent(), a StressProfile, or the path of a file."
-        raise InputError(f"The expected stress is a {type(expected).__name__}.", cure=cure)
+        raise InputError(
+            f"The expected stress is a {type(expected).__name__}.",
+            cure="Give a contact from memscal.indent(), a StressProfile, or the path of a file.",
+        )
 
     def profile(self) -> StressProfile:
         """Return the restored stress as a table with its uncertainty, as a file holds it."""
@@ -282,9 +284,11 @@ class Restoration(Result, Checked):
         radii = np.abs(np.asarray(r, dtype=np.float64))
         reach = reach_of(self.points)
         if not np.all(radii <= reach):
-            why = f"The stress was restored out to {reach * 1e3:.4g} mm."
-            cure = "Give radii in metres, within 1.5 times the scan's width."
-            raise InputError(f"A radius is {np.max(radii) * 1e3:.4g} mm.", why=why, cure=cure)
+            raise InputError(
+                f"A radius is {np.max(radii) * 1e3:.4g} mm.",
+                why=f"The stress was restored out to {reach * 1e3:.4g} mm.",
+                cure="Give radii in metres, within 1.5 times the scan's width.",
+            )
         wavenumbers = self.posterior.estimate.model.reference.wavenumbers
         return wavenumbers.synthesise(np.eye(wavenumbers.k.size), radii)
 

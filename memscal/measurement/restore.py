@@ -69,9 +69,9 @@ def scan_at_load(scan: Scan, load: float) -> Scan:
         if abs(single.stated_load - load) <= _ONE_LOAD * load:
             return single
     held = ", ".join(f"{single.stated_load:.4g}" for single in singles)
-    cure = "Give one of these loads, to within 5 %."
     raise InputError(
-        f"{place_of(scan)} has loads of {held} N, and none of {load:.4g} N.", cure=cure
+        f"{place_of(scan)} has loads of {held} N, and none of {load:.4g} N.",
+        cure="Give one of these loads, to within 5 %.",
     )
 
 
@@ -89,10 +89,11 @@ def load_of(scan: Scan) -> str:
 def _line_load(scan: Scan, loads: FloatArray, line: str) -> float:
     recorded = loads[np.isfinite(loads)]
     if not recorded.size:
-        problem = f"{place_of(scan)}{line}: every load is missing (NaN in normal_load)."
-        why = "The stress under a curved indenter depends on its load."
-        cure = "State the loads, or leave normal_load out where there is one nominal load only."
-        raise InputError(problem, why=why, cure=cure)
+        raise InputError(
+            f"{place_of(scan)}{line}: every load is missing (NaN in normal_load).",
+            why="The stress under a curved indenter depends on its load.",
+            cure="State the loads, or leave normal_load out where there is one nominal load only.",
+        )
     load = float(np.median(recorded))
     if np.abs(recorded - load).max() > _SCATTER * load:
         raise InputError(
@@ -112,8 +113,14 @@ def require_contact_size(scan: Scan, most: int = MOST_OF_CONTACT, why: str = _HE
     """Refuse a contact of more points than its stress is restored or measured from."""
     size = scan.u_zz.size
     if size > most:
-        cure = "Average neighbouring readings, thin the raster, or leave out repeats."
-        raise too_large(place_of(scan), size, most, "points of one load", why=why, cure=cure)
+        raise too_large(
+            place_of(scan),
+            size,
+            most,
+            "points of one load",
+            why=why,
+            cure="Average neighbouring readings, thin the raster, or leave out repeats.",
+        )
 
 
 def require_measurement(scan: Scan, apparatus: ApparatusFunction) -> None:
@@ -175,9 +182,10 @@ def accept_other_sensor(
     unit = scan.unit or "V"
     si = apparatus.reading.si
     if unit != si:
-        problem = f"The readings of {places[0]} are in {unit}, those of the artifact in {si}."
-        cure = "Give the artifact of this sensor, or correct the units of /entry/data/u_zz."
-        raise InputError(problem, cure=cure)
+        raise InputError(
+            f"The readings of {places[0]} are in {unit}, those of the artifact in {si}.",
+            cure="Give the artifact of this sensor, or correct the units of /entry/data/u_zz.",
+        )
     sensors = (scan.sensor, apparatus.sensor)
     films = (scan.film, apparatus.film)
     differences = stated_differences(SENSOR, names, sensors, places)
@@ -197,34 +205,34 @@ FORCE_LIMIT = 3.0
 NEGLIGIBLE_FORCE = 0.01
 
 
-def _checks(restored: Restoration) -> list[QualityCheck]:
+def _checks(restored: Restoration) -> Iterator[QualityCheck]:
     degrees = restored.degrees
-    blurred = (
+    yield check(
+        "reconvolution",
+        restored.chi_square / degrees,
+        chi_square_limit(degrees) / degrees,
         "Reduced chi-square of the scan against the restored stress blurred again by A G. A "
         "failure means that no radial stress at the base of this film explains the scan through "
-        "this apparatus function."
+        "this apparatus function.",
     )
     load = restored.scan.stated_load
     budget = force_less_load(restored.force_budget, restored.scan.load_uncertainty)
     allowed = math.hypot(*budget.values(), NEGLIGIBLE_FORCE * load)
-    carried = (
+    yield check(
+        "restored_force",
+        abs(restored.force - load) / allowed,
+        FORCE_LIMIT,
         f"Difference of the restored stress's total force, {restored.force:.4g} N, from the load "
         f"of {load:.4g} N, in their standard uncertainty. A failure means that gain, load or unit "
         "differ between the calibration and this scan, or that the film's Poisson's ratio, which "
         "decides how much lies beyond the scan, is wrong. It does not test A: a factor that is "
-        "wrong in both, such as of one balance, changes nothing."
+        "wrong in both, such as of one balance, changes nothing.",
     )
-    limit = chi_square_limit(degrees) / degrees
-    checks = [
-        check("reconvolution", restored.chi_square / degrees, limit, blurred),
-        check("restored_force", abs(restored.force - load) / allowed, FORCE_LIMIT, carried),
-        *_noise(restored),
-        _symmetry(restored),
-        quality.outlier_check(restored.posterior.estimate.outlier_weight, "the residuals"),
-    ]
+    yield from _noise(restored)
+    yield _symmetry(restored)
+    yield quality.outlier_check(restored.posterior.estimate.outlier_weight, "the residuals")
     if restored.comparison is not None:
-        checks.append(_expected(restored.comparison))
-    return checks
+        yield _expected(restored.comparison)
 
 
 def force_less_load(
@@ -237,21 +245,23 @@ def force_less_load(
     return {**force_budget, "load": of_load}
 
 
-def _noise(restored: Restoration) -> list[QualityCheck]:
+def _noise(restored: Restoration) -> Iterator[QualityCheck]:
     if restored.points.u_errors is None:
-        return []
-    checks = [quality.noise_check(restored.posterior.found_noise)]
+        return
+    yield quality.noise_check(restored.posterior.found_noise)
     residuals = residuals_of(restored.posterior.estimate)
     if residuals.degrees >= FEWEST_RESIDUALS:
         size = chi_square_test(residuals)
-        meaning = (
+        yield check(
+            "chi_square",
+            size.value,
+            size.limit,
             "What no radial pressure on the film can explain of the scan, compared with the stated "
             f"noise: reduced chi-square of {residuals.degrees} degrees. A failure means that "
             "the noise is larger than stated, the contact is not round, or the baseline is no "
-            "straight line."
+            "straight line.",
+            size.p_value,
         )
-        checks.append(check("chi_square", size.value, size.limit, meaning, size.p_value))
-    return checks
 
 
 def _symmetry(restored: Restoration) -> QualityCheck:
@@ -267,8 +277,9 @@ def _symmetry(restored: Restoration) -> QualityCheck:
             "odd columns. A failure means that the left and right halves differ: a tilted "
             "indenter, an uneven film, or a drifting load."
         )
-    meaning = f"Fall of chi-square by {uneven.count} {meaning}"
-    return quality.added_check(name, uneven.fall, uneven.count, meaning)
+    return quality.added_check(
+        name, uneven.fall, uneven.count, f"Fall of chi-square by {uneven.count} {meaning}"
+    )
 
 
 def _expected(compared: StressComparison) -> QualityCheck:
@@ -296,8 +307,12 @@ def restoration_messages(
     if points.u_errors is None:
         messages.append(noise_unstated_message(points.reading.text(restored.noise.min())))
     if not restored.apparatus.radial_profile.g_errors.any():
-        text = "The artifact states no uncertainty of G: nothing is counted for it."
-        messages.append(Message("uncertainty_unstated", text))
+        messages.append(
+            Message(
+                "uncertainty_unstated",
+                "The artifact states no uncertainty of G: nothing is counted for it.",
+            )
+        )
     film = restored.scan.set_up.film
     unstated = {
         "film thickness": film.thickness_uncertainty,
@@ -315,8 +330,10 @@ def failed_calibration_messages(apparatus: ApparatusFunction) -> list[Message]:
 
 def noise_unstated_message(noise: str) -> Message:
     """Return the message for a scan without u_zz_errors, with the estimated noise in its unit."""
-    text = f"u_zz_errors is absent: a noise of {noise} was estimated from the scatter."
-    return Message(quality.NOISE_UNSTATED, text)
+    return Message(
+        quality.NOISE_UNSTATED,
+        f"u_zz_errors is absent: a noise of {noise} was estimated from the scatter.",
+    )
 
 
 @single_threaded()
@@ -411,8 +428,8 @@ def restore_known(
     )
     if expected is not None:
         restored = replace(restored, comparison=restored.compare(expected))
-    checks = _checks(restored)
-    return replace(restored, checks=tuple(checks), messages=restoration_messages(restored, checks))
+    checks = tuple(_checks(restored))
+    return replace(restored, checks=checks, messages=restoration_messages(restored, checks))
 
 
 def gaussian_pressure(

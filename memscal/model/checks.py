@@ -199,22 +199,26 @@ def check(
 
 def noise_check(scatter: float, channel: str = "zz") -> QualityCheck:
     """Return the check of the scatter over the stated noise."""
-    meaning = (
+    return check(
+        "noise_as_stated",
+        scatter,
+        NOISE_LIMIT,
         f"Scatter about the fitted profile over the stated u_{channel}_errors. A failure means "
         "that something besides electronic noise scatters the scan, such as position or load; the "
-        "uncertainties have been raised accordingly."
+        "uncertainties have been raised accordingly.",
     )
-    return check("noise_as_stated", scatter, NOISE_LIMIT, meaning)
 
 
 def outlier_check(weights: "FloatArray", where: str) -> QualityCheck:
     """Return the check of the share of outliers by the weights of the points."""
-    meaning = (
-        "Share of points whose weight was more than halved. A failure means that the noise is not "
-        f"what the uncertainties take it for: look at {where}."
-    )
     share = float((weights < OUTLIER_WEIGHT).mean())
-    return check("outliers", share, _OUTLIER_LIMIT, meaning)
+    return check(
+        "outliers",
+        share,
+        _OUTLIER_LIMIT,
+        "Share of points whose weight was more than halved. A failure means that the noise is not "
+        f"what the uncertainties take it for: look at {where}.",
+    )
 
 
 def added_check(name: str, fall: float, count: int, meaning: str) -> QualityCheck:

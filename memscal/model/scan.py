@@ -58,8 +58,10 @@ def require_contacts(scan: Scan) -> None:
             cure="Give normal_load too, the load that was set at each point.",
         )
     if scan.lubrication not in LUBRICATIONS:
-        cure = "Give 'dry' or 'lubricated', or leave it out."
-        raise InputError(f"The lubrication of the scan is {scan.lubrication!r}.", cure=cure)
+        raise InputError(
+            f"The lubrication of the scan is {scan.lubrication!r}.",
+            cure="Give 'dry' or 'lubricated', or leave it out.",
+        )
     if scan.lubricant and scan.lubrication != "lubricated":
         stated = scan.lubrication or "not stated"
         raise InputError(
@@ -414,8 +416,9 @@ class Scan:
             stated = getattr(self, name)
             if stated is not None:
                 values = arrays.finite_vector(f"{name} of the scan", stated)
-                place = f"{name} of the scan (/entry/data/{name})"
-                arrays.require_size(place, values, "m", smallest=0.0)
+                arrays.require_size(
+                    f"{name} of the scan (/entry/data/{name})", values, "m", smallest=0.0
+                )
                 object.__setattr__(self, name, values)
         if self.repeat is not None:
             repeat = arrays.whole_numbers("repeat of the scan", self.repeat)
@@ -490,16 +493,22 @@ class Scan:
             problem = "normal_load holds a load that is infinite or not above zero."
             raise InputError(problem, cure="Mark points without contact as missing (NaN).")
         if np.isnan(loads).all():
-            cure = "Leave it out, and state the one load of all points."
-            raise InputError("normal_load is missing (NaN) at every point.", cure=cure)
+            raise InputError(
+                "normal_load is missing (NaN) at every point.",
+                cure="Leave it out, and state the one load of all points.",
+            )
 
     def _check_set_up(self) -> None:
         if self.direction not in ("x", "y") or (self.direction == "y" and self.y is not None):
-            cure = "A line scan runs along 'x' or 'y'; a raster has its own y."
-            raise InputError(f"The direction of the scan is {self.direction!r}.", cure=cure)
+            raise InputError(
+                f"The direction of the scan is {self.direction!r}.",
+                cure="A line scan runs along 'x' or 'y'; a raster has its own y.",
+            )
         for name in STATED_ERRORS:
-            words = f"{name.replace('_', ' ')} uncertainty of the scan"
-            arrays.require_non_negative(words, getattr(self, f"{name}_uncertainty"))
+            arrays.require_non_negative(
+                f"{name.replace('_', ' ')} uncertainty of the scan",
+                getattr(self, f"{name}_uncertainty"),
+            )
         require_rod_friction(self.rod_friction)
         arrays.require_non_negative("standard uncertainty of the load", self.load_uncertainty)
         if self.load is None:

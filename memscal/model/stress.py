@@ -67,8 +67,10 @@ class IdealReference:
         if self.shape != "point":
             arrays.require_positive(f"{IDEAL[self.shape]} of the {self.shape}", self.size, "m")
         elif self.size:
-            cure = "Leave it out, or take gaussian:S."
-            raise InputError(f"A point has no size, but {self.size:g} m is given.", cure=cure)
+            raise InputError(
+                f"A point has no size, but {self.size:g} m is given.",
+                cure="Leave it out, or take gaussian:S.",
+            )
 
     def __str__(self) -> str:
         """Return it in words, with its size."""
