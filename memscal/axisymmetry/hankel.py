@@ -17,7 +17,6 @@ radial function it stays such a field, and the transforms are multiplied.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from functools import lru_cache
 from typing import Any, ClassVar
 
@@ -25,7 +24,14 @@ import numpy as np
 from scipy.special import j0, j1, jv
 
 from memscal.errors import InputError
-from memscal.model.arrays import ArrayPair, FloatArray, array_record, floats, table_spline
+from memscal.model.arrays import (
+    ArrayFunction,
+    ArrayPair,
+    FloatArray,
+    array_record,
+    floats,
+    table_spline,
+)
 
 
 def gauss_panels(upper: float, longest: float, order: int = 16) -> ArrayPair:
@@ -128,9 +134,7 @@ class RadialSpectrum:
         return np.where(k <= nodes[-1], radial_spline(nodes, self.values)(k), 0.0)
 
 
-def radial_spline(
-    r: FloatArray, f: FloatArray, *, order: int = 0
-) -> Callable[[FloatArray], FloatArray]:
+def radial_spline(r: FloatArray, f: FloatArray, *, order: int = 0) -> ArrayFunction:
     """Return an even (odd for ``order`` 1) cubic spline through a table, mirrored at the axis."""
     from scipy.interpolate import CubicSpline
 

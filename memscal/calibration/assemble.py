@@ -22,8 +22,9 @@ from memscal.model.apparatus import (
     Reconvolution,
     TransferFunction,
 )
+from memscal.model.arrays import Values
 from memscal.model.assumptions import Assumption
-from memscal.model.checks import QualityCheck
+from memscal.model.checks import QualityChecks
 from memscal.model.provenance import Process
 from memscal.model.scan import common_circumstances
 
@@ -36,10 +37,10 @@ def assemble(
     solution: Solution,
     results: Results,
     other: Results | None,
-    checks: tuple[QualityCheck, ...],
+    checks: QualityChecks,
     laws: FilmLawComparison | None,
     assumptions: tuple[Assumption, ...],
-    explanations: list[dict[str, Any]],
+    explanations: list[Values],
 ) -> ApparatusFunction:
     """Return the apparatus function with everything that its artifact stores."""
     # Film and indenter are as stated by the scan where nothing was calculated with them.
@@ -89,8 +90,8 @@ def _configuration(
     solution: Solution,
     results: Results,
     laws: FilmLawComparison | None,
-    explanations: list[dict[str, Any]],
-) -> dict[str, Any]:
+    explanations: list[Values],
+) -> Values:
     """Return what was asked for and decided; what is usual is left out."""
     request = prepared.request
     method: Any = request.method
@@ -99,7 +100,7 @@ def _configuration(
     if is_dataclass(method) and not isinstance(method, type):
         options = asdict(method)
     unit = prepared.reading.per
-    centre: dict[str, Any] | None = None
+    centre: Values | None = None
     if request.centre is not None or solution.apart is not None:
         choice = PER_REPEAT if solution.per_repeat else COMMON
         centre = {"choice": choice, "chosen_by": "option" if request.centre else "test"}

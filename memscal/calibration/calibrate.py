@@ -1,7 +1,7 @@
 """Calibration: from rod scans to an apparatus function with its covariance and checks."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import field, replace
 from typing import TYPE_CHECKING, Any
@@ -22,7 +22,7 @@ from memscal.calibration.fields import RasterFields
 from memscal.calibration.film_inference import free_thickness, require_free, weigh_laws
 from memscal.calibration.prepare import Prepared, Reference, Request, prepare
 from memscal.calibration.stages import Deconvolution, Solution, solve
-from memscal.calibration.uncertainty import InputEffect, Results, input_effects, propagate
+from memscal.calibration.uncertainty import Correlations, Effects, Results, input_effects, propagate
 from memscal.deconvolution.division import Method, chosen_method
 from memscal.errors import FitError, MemscalError
 from memscal.estimation.profile import LEAST_DISTINCT
@@ -75,8 +75,8 @@ class Calibration(Result):
 
     apparatus: ApparatusFunction
     solution: Solution
-    effects: Mapping[str, InputEffect] = field(default_factory=dict)
-    correlations: Mapping[tuple[str, str], float] = field(default_factory=dict)
+    effects: Effects = field(default_factory=dict)
+    correlations: Correlations = field(default_factory=dict)
 
     def __repr__(self) -> str:
         """Return method and result, without arrays."""
@@ -134,7 +134,7 @@ def calibrate(
     channel: str = "zz",
     method: str | Method = "white-noise",
     centre: str | None = None,
-    correlations: Mapping[tuple[str, str], float] | None = None,
+    correlations: Correlations | None = None,
     pixel_size: float | None = None,
     free: str | Sequence[str] = (),
     seed: int = 0,
@@ -291,7 +291,7 @@ def _with_thickness(prepared: Prepared) -> Prepared:
 
 
 def _propagated(
-    solution: Solution, effects: Mapping[str, InputEffect], prepared: Prepared, *, other: bool
+    solution: Solution, effects: Effects, prepared: Prepared, *, other: bool
 ) -> tuple[Results, Results | None]:
     """Propagate the uncertainties by the method, and by the other route where it is open."""
     inputs = (effects, prepared.request.correlations, prepared.reading)
@@ -327,9 +327,7 @@ def _require_distinct(results: Results, solution: Solution) -> None:
     )
 
 
-def _effects(
-    solution: Solution, alternatives: Sequence[BaseStress | None] | None
-) -> Mapping[str, InputEffect]:
+def _effects(solution: Solution, alternatives: Sequence[BaseStress | None] | None) -> Effects:
     """Return what the inputs change, to first order; two laws of the film, by calibrating twice."""
     scans = solution.scans
     estimate = solution.estimate
@@ -355,8 +353,8 @@ def _effects(
 def uncertainties(
     solution: Solution,
     deconvolution: Deconvolution,
-    effects: Mapping[str, InputEffect],
-    correlations: Mapping[tuple[str, str], float],
+    effects: Effects,
+    correlations: Correlations,
     reading: Reading = VOLTS,
 ) -> Results:
     """Propagate noise and inputs through the steps of one route."""

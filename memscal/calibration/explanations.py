@@ -31,9 +31,9 @@ from memscal.estimation.profile import gaussian_log_marginal
 from memscal.estimation.reference_spectra import difference, law_at_once, spectrum_difference
 from memscal.estimation.set_up import film_of
 from memscal.mechanics.press_rod import is_tabulated, press_rod
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import FloatArray, Values
 from memscal.model.bayes_factor import POSITIVE, VERY_STRONG
-from memscal.model.checks import QualityCheck
+from memscal.model.checks import QualityCheck, QualityChecks
 from memscal.model.film import LINEAR, NEO_HOOKEAN
 from memscal.model.notation import format_measured
 from memscal.model.quantities import MM
@@ -81,7 +81,7 @@ _DELAYS = 10
 
 def explained(
     solution: Solution, checks: Sequence[QualityCheck]
-) -> tuple[tuple[QualityCheck, ...], list[dict[str, Any]]]:
+) -> tuple[QualityChecks, list[Values]]:
     """Weigh what explains a misfit; return the checks with what was found, and rows for files."""
     if not misfit(checks):
         return tuple(checks), []
@@ -117,7 +117,7 @@ def explanation(rows: Sequence[Mapping[str, Any]]) -> str:
     )
 
 
-def _weighed(solution: Solution, departure: float) -> list[dict[str, Any]]:
+def _weighed(solution: Solution, departure: float) -> list[Values]:
     """Weigh each rival beside a G that is not Gaussian, by falling evidence."""
     gaussian = float(solution.estimate.weighed.log_marginals[0])
     found = [(departure, DEPARTURE, _BY_G, 0.0)]

@@ -19,7 +19,6 @@ is counted beside that, as it is for the profile (``window``).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -28,10 +27,17 @@ from scipy.fft import fftfreq, fftshift, ifftshift, irfft2, rfft2, rfftfreq
 
 from memscal.calibration.fields import cosine_taper
 from memscal.calibration.stages import Deconvolution, Solution
-from memscal.calibration.uncertainty import InputEffect, correlation_matrix
+from memscal.calibration.uncertainty import Correlations, Effects, correlation_matrix
 from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.voltage_map import BLOCK, square_root
-from memscal.model.arrays import BoolArray, FloatArray, IndexArray, array_record
+from memscal.model.arrays import (
+    ArrayFunction,
+    ArrayPair,
+    BoolArray,
+    FloatArray,
+    IndexArray,
+    array_record,
+)
 from memscal.progress import Task
 
 ComplexArray: TypeAlias = NDArray[np.complex128]
@@ -46,8 +52,8 @@ _COLUMNS = 16
 def field_errors(
     solution: Solution,
     deconvolution: Deconvolution,
-    effects: Mapping[str, InputEffect],
-    correlations: Mapping[tuple[str, str], float],
+    effects: Effects,
+    correlations: Correlations,
 ) -> FloatArray:
     """Standard uncertainty of G on its grid (2, m, n), in 1/m^2: of noise alone, and in all."""
     from scipy.interpolate import RectBivariateSpline
@@ -83,9 +89,7 @@ def _nodes(axis: FloatArray, width: float, reach: float) -> FloatArray:
     return nodes[near]
 
 
-def _kernels(
-    estimate: ProfileEstimate, x: FloatArray, y: FloatArray
-) -> Callable[[FloatArray], FloatArray]:
+def _kernels(estimate: ProfileEstimate, x: FloatArray, y: FloatArray) -> ArrayFunction:
     """Return combinations (p, m) of the posterior's kernels on a grid about the centre."""
     from scipy.interpolate import CubicSpline
 
@@ -108,7 +112,7 @@ def _kernels(
 def _posterior_variances(
     solution: Solution,
     deconvolution: Deconvolution,
-    axes: tuple[FloatArray, FloatArray],
+    axes: ArrayPair,
     g: FloatArray,
     inputs: FloatArray,
 ) -> FloatArray:
@@ -147,7 +151,7 @@ class _Filter:
         share: FloatArray,
         ratio: ComplexArray,
         window: FloatArray,
-        axes: tuple[FloatArray, FloatArray],
+        axes: ArrayPair,
         stated: tuple[BoolArray, BoolArray],
     ) -> _Filter:
         """Return the band in which a window is open; ``axes``, ``stated``: y and x of nodes."""
@@ -205,7 +209,7 @@ def _summed(planes: FloatArray, waves: list[ComplexArray]) -> ComplexArray:
 
 def _by_parameters(
     estimate: ProfileEstimate,
-    axes: tuple[FloatArray, FloatArray],
+    axes: ArrayPair,
     inside: IndexArray,
     taper: FloatArray,
     division: _Filter,
@@ -242,7 +246,7 @@ def _by_parameters(
 def _division_variances(
     solution: Solution,
     deconvolution: Deconvolution,
-    axes: tuple[FloatArray, FloatArray],
+    axes: ArrayPair,
     g: FloatArray,
     inputs: FloatArray,
 ) -> FloatArray:

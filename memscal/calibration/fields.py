@@ -19,7 +19,7 @@ from memscal.estimation.forward import wave_table
 from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.smoothing import SmoothedProfile, rounded_reach
 from memscal.estimation.voltage_map import DENSE, VoltageMap
-from memscal.model.arrays import FloatArray, IndexArray, array_record, value_record
+from memscal.model.arrays import ArrayFunction, FloatArray, IndexArray, array_record, value_record
 from memscal.model.places import EvenAxis
 from memscal.readings.find_places import even_lattice
 
@@ -111,7 +111,7 @@ class LineFields:
         confinement = cosine_taper(grid.radius, support)
         return cls(grid, voltage, stress, support, inside, confinement, estimate.distance)
 
-    def kernel(self, profile: Callable[[FloatArray], FloatArray]) -> FloatArray:
+    def kernel(self, profile: ArrayFunction) -> FloatArray:
         """Lift a radial function about a kernel's zero, as far as its support goes."""
         values = on_grid(profile, self.inside, self.grid.spacing / 2)
         return np.pad(values, (0, self.grid.count - self.inside.count))
@@ -204,11 +204,11 @@ class RasterFields:
             even,
         )
 
-    def kernel(self, profile: Callable[[FloatArray], FloatArray]) -> FloatArray:
+    def kernel(self, profile: ArrayFunction) -> FloatArray:
         """Lift a radial function about a kernel's zero, with what of the sensor is not round."""
         return self._lifted(profile, self.central)
 
-    def _lifted(self, profile: Callable[[FloatArray], FloatArray], grid: Lattice) -> FloatArray:
+    def _lifted(self, profile: ArrayFunction, grid: Lattice) -> FloatArray:
         return on_grid(profile, grid, self.step) + self.oval(*grid.axes)
 
     def convolved(self, kernel: Field) -> FloatArray:

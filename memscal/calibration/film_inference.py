@@ -12,7 +12,6 @@ prior, and the expected squared error of it by the priors of G's uncertainty.
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -25,7 +24,7 @@ from memscal.estimation.profile import log_marginal_likelihood
 from memscal.estimation.reference_spectra import reference_spectra
 from memscal.estimation.set_up import film_of
 from memscal.mechanics.press_rod import is_tabulated, press_rod
-from memscal.model.arrays import FloatArray, value_record
+from memscal.model.arrays import FloatArray, Values, value_record
 from memscal.model.bayes_factor import POSITIVE, STRONG, BayesFactor
 from memscal.model.checks import Message
 from memscal.model.film import LINEAR, NEO_HOOKEAN, ElasticFilm, law_in_words
@@ -62,10 +61,10 @@ class FilmLawComparison:
         return BayesFactor(best.law, law.law, best.log_evidence - law.log_evidence)
 
     @property
-    def record(self) -> list[dict[str, Any]]:
+    def record(self) -> list[Values]:
         """What files and JSON hold: of each law its evidence below the best's, A and sigma."""
         unit = self.reading.over(self.reading.unit)
-        rows: list[dict[str, Any]] = []
+        rows: list[Values] = []
         for law in self.laws:
             factor = self.factor(law)
             a = law.conversion_constant / self.reading.scale
@@ -171,7 +170,7 @@ class FreeThickness:
         return tuple(replace(scan, film=self.films[scan.set_up.film]) for scan in scans)
 
     @property
-    def record(self) -> dict[str, Any]:
+    def record(self) -> Values:
         """What files and JSON hold: prior and posterior of each film's thickness."""
         rows = [
             {"film": prior.name, "prior": _thickness(prior), "posterior": _thickness(posterior)}
@@ -198,7 +197,7 @@ class FreeThickness:
         return messages
 
 
-def _thickness(film: ElasticFilm) -> dict[str, Any]:
+def _thickness(film: ElasticFilm) -> Values:
     u = (film.thickness_uncertainty or 0.0) / MM
     return {"value": film.thickness / MM, "standard_uncertainty": u, "unit": "mm"}
 

@@ -15,7 +15,7 @@ from memscal.estimation.reference_spectra import RECTANGLE
 from memscal.mechanics.contact import Contact
 from memscal.model import checks as quality
 from memscal.model.assumptions import ASSUMED, MOVED, Assumption
-from memscal.model.checks import Message, QualityCheck
+from memscal.model.checks import Message, Messages, QualityChecks
 from memscal.model.film import LINEAR, NEO_HOOKEAN, law_in_words
 
 #: Methods whose window is that of the stress's transform: nothing is left to say of them.
@@ -34,10 +34,10 @@ def calibration_messages(
     prepared: Prepared,
     solution: Solution,
     results: Results,
-    checks: tuple[QualityCheck, ...],
+    checks: QualityChecks,
     laws: FilmLawComparison | None,
     assumptions: tuple[Assumption, ...],
-) -> tuple[Message, ...]:
+) -> Messages:
     """Return the messages that accompany a result: what was decided, then warnings first."""
     estimate = solution.estimate
     channel = estimate.points.channel

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import chain
 from os import PathLike
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
@@ -24,7 +24,7 @@ from memscal.estimation.set_up import (
 )
 from memscal.mechanics.contact import BaseStress, Contact, stress_table
 from memscal.mechanics.press_rod import press_rod
-from memscal.model.arrays import array_record, keyword_array_record
+from memscal.model.arrays import Values, array_record, keyword_array_record
 from memscal.model.film import LINEAR
 from memscal.model.notation import RELATIVE, Reading
 from memscal.model.provenance import accepted_alterations
@@ -182,7 +182,7 @@ def _with_some_load(scan: Scan) -> Scan:
 def _without_loads(scan: Scan, stress: BaseStress | None) -> Scan:
     """Return the scan without loads; a rod that has to be solved keeps its nominal one."""
     load = None if stress else scan.load
-    loads: dict[str, Any] = {"normal_load": None, "normal_load_errors": None}
+    loads: Values = {"normal_load": None, "normal_load_errors": None}
     return replace(scan, load=load, load_uncertainty=None, **loads)
 
 

@@ -85,6 +85,11 @@ class InputEffect:
     exact: Solution | None = None  # of the bound, where the first order does not serve
 
 
+Effects = Mapping[str, InputEffect]
+Correlations = Mapping[tuple[str, str], float]
+"""Coefficients of the errors of two inputs, by their names."""
+
+
 def input_effects(
     scans: Sequence[Scan],
     stresses: Sequence[StressProfile | Contact],
@@ -177,9 +182,7 @@ def _varying_gain(estimate: ProfileEstimate) -> float:
     return float(np.sqrt(max(variance, 0.0) / repeats.size))
 
 
-def correlation_matrix(
-    sources: Sequence[str], correlations: Mapping[tuple[str, str], float]
-) -> FloatArray:
+def correlation_matrix(sources: Sequence[str], correlations: Correlations) -> FloatArray:
     """Return the correlation matrix of inputs, the identity but for the stated pairs."""
     matrix = np.eye(len(sources))
     for pair, coefficient in correlations.items():
@@ -261,8 +264,8 @@ class _Derivatives:
 def propagate(
     solution: Solution,
     deconvolution: Deconvolution,
-    effects: Mapping[str, InputEffect],
-    correlations: Mapping[tuple[str, str], float],
+    effects: Effects,
+    correlations: Correlations,
     drawn: DrawnScatter | None,
 ) -> Results:
     """Propagate all stated uncertainties to a deconvolution."""

@@ -22,6 +22,7 @@ from memscal.deconvolution.division import DivisionProblem, Regulariser, chosen_
 from memscal.errors import FitError, InputError
 from memscal.estimation.bayesian import Bayesian
 from memscal.model.arrays import (
+    ArrayPair,
     FloatArray,
     array_record,
     finite_vector,
@@ -99,7 +100,7 @@ class Field:
         """Fourier transform, in the layout of the grid and the unit of the values times m^2."""
         return self.grid.forward(self.values)
 
-    def spectrum(self) -> tuple[FloatArray, FloatArray]:
+    def spectrum(self) -> ArrayPair:
         """Return wavenumbers along x, in rad/m, and the modulus of the Fourier transform there."""
         return self.grid.wavenumber[0], np.abs(self.transform[0])
 

@@ -6,7 +6,7 @@ from memscal.axisymmetry.hankel import radial_spline, ring_areas
 from memscal.axisymmetry.kernels import unit_gaussian, unit_gaussian_slope
 from memscal.deconvolution.fourier_ratio import Field
 from memscal.estimation.gaussian import gauss_newton
-from memscal.model.arrays import FloatArray, array_record
+from memscal.model.arrays import ArrayPair, FloatArray, array_record
 
 #: Points per step of the profile between which the half maximum is interpolated.
 _FINE = 20
@@ -47,7 +47,7 @@ def fit_gaussian(g: Field, start: float | None = None) -> float:
     if start is None:
         start = max(float(1 / np.sqrt(4 * np.pi * g.grid.integrate(g.values**2))), 2 * narrowest)
 
-    def linearise(scaled: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def linearise(scaled: FloatArray) -> ArrayPair:
         """Misfit at a width over ``start``, and its slope."""
         # A step may lead beyond the narrowest width, where the search with a bound takes over.
         sigma = max(scaled[0], narrowest / start) * start

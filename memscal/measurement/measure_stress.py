@@ -16,7 +16,7 @@ from memscal.measurement import restore
 from memscal.measurement.restoration import Restoration
 from memscal.model import checks as quality
 from memscal.model.arrays import FloatArray
-from memscal.model.checks import Message, QualityCheck, check
+from memscal.model.checks import Message, QualityCheck, QualityChecks, check
 from memscal.model.measured_stress import MeasuredProfile, MeasuredScan, MeasuredStress
 from memscal.model.provenance import Process, accepted_alterations
 from memscal.model.scan import STATED_ERRORS, Scan
@@ -46,7 +46,7 @@ _NOISE_CHECKS = ("noise_as_stated", "chi_square")
 
 def stress_checks(
     profiles: Sequence[MeasuredProfile], restored: Sequence[Sequence[QualityCheck]]
-) -> tuple[QualityCheck, ...]:
+) -> QualityChecks:
     """Return each profile's checks (``restored``), numbered from one, then that of all."""
     checks = []
     for number, (profile, others) in enumerate(zip(profiles, restored, strict=True), start=1):

@@ -44,7 +44,7 @@ from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.reference_spectra import law_at_once, law_sensitivities, rod_spectrum
 from memscal.estimation.voltage_map import VoltageMap
 from memscal.mechanics.film_response import base_normal
-from memscal.model.arrays import FloatArray, array_record, value_record
+from memscal.model.arrays import ArrayPair, Arrays, FloatArray, array_record, value_record
 from memscal.model.film import LINEAR, NEO_HOOKEAN, ElasticFilm, more_and_less
 from memscal.model.measured_stress import MeasuredScan
 from memscal.model.scan import Scan, SetUp
@@ -90,7 +90,7 @@ class PressureShape:
     shear: float  # c, outward shear over pressure at the radius of two widths
     film: ElasticFilm
 
-    def transform(self, k: FloatArray, width: float) -> tuple[FloatArray, FloatArray]:
+    def transform(self, k: FloatArray, width: float) -> ArrayPair:
         """Transform at ``k`` (rad/m) for a width (m), one at k = 0; its derivative by the width."""
         plain, first, second = _three_orders(self.exponent, k.tobytes(), width)
         slope = -width * k**2 * first
@@ -153,7 +153,7 @@ class _Basis(DepartureBasis):
 
     shape: PressureShape
 
-    def _sensor(self, place: FloatArray, _: Side) -> tuple[FloatArray, FloatArray]:
+    def _sensor(self, place: FloatArray, _: Side) -> ArrayPair:
         kernel, slope = self.shape.transform(place, self.sigma)
         return kernel, self.conversion_constant * slope
 
@@ -419,7 +419,7 @@ def _signals(estimate: ProfileEstimate, state: FloatArray, changes: FloatArray) 
 
 def sensor_changes(
     apparatus: ApparatusFunction, k: FloatArray, without: Iterable[str] = ()
-) -> tuple[FloatArray, FloatArray]:
+) -> ArrayPair:
     """Return the transform of G, as a convolution has it, and changes of that of A G, in V/Pa.
 
     The changes (n, q) by one uncertainty are independent; those ``without`` which they are asked
@@ -434,7 +434,7 @@ _FILM_PROPERTIES = ("young_modulus", "poisson_ratio", "thickness")
 
 def shared_changes(
     apparatus: ApparatusFunction, scans: Sequence[Scan | MeasuredScan], k: FloatArray
-) -> dict[str, FloatArray]:
+) -> Arrays:
     """Return changes (n,) of the transform of A G, in V/Pa, by what contacts share with the sensor.
 
     By one standard uncertainty of each property of its film, and of the load on its load cell.
@@ -448,9 +448,7 @@ def shared_changes(
     return input_changes(apparatus, names, k)
 
 
-def input_changes(
-    apparatus: ApparatusFunction, names: Iterable[str], k: FloatArray
-) -> dict[str, FloatArray]:
+def input_changes(apparatus: ApparatusFunction, names: Iterable[str], k: FloatArray) -> Arrays:
     """Return changes (n,) of the transform of A G, in V/Pa, by inputs of the calibration."""
     known = tuple(name for name in names if name in apparatus.kernel_changes)
     changes = _kernel_changes(apparatus, k.tobytes(), known)
@@ -492,7 +490,7 @@ def _alike(film: ElasticFilm, other: ElasticFilm) -> bool:
 @lru_cache(maxsize=16)
 def _sensor_changes(
     apparatus: ApparatusFunction, nodes: bytes, without: tuple[str, ...] = ()
-) -> tuple[FloatArray, FloatArray]:
+) -> ArrayPair:
     """Return transfer function and changes, which all profiles of one sensor share."""
     profile = apparatus.radial_profile
     a = apparatus.conversion_constant
@@ -514,9 +512,9 @@ def _sensor_changes(
     return transforms[:, 0], transforms[:, 1:]
 
 
-def _film_changes(set_up: SetUp, wavenumbers: Wavenumbers) -> dict[str, FloatArray]:
+def _film_changes(set_up: SetUp, wavenumbers: Wavenumbers) -> Arrays:
     """Change of the film's transfer function by one standard uncertainty of what is not known."""
-    changes: dict[str, FloatArray] = {}
+    changes: Arrays = {}
     for name in ("thickness", "poisson_ratio"):
         ends = more_and_less(set_up.film, name)
         if ends:

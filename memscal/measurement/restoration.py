@@ -17,7 +17,7 @@ from memscal.measurement.posterior import Posterior, film_transfer, reach_of, se
 from memscal.mechanics.contact import Contact
 from memscal.model import checks as quality
 from memscal.model.arrays import FloatArray, array_record
-from memscal.model.checks import Checked, Message, QualityCheck
+from memscal.model.checks import Checked, Messages, QualityChecks
 from memscal.model.indenter import Rod
 from memscal.model.notation import format_measured
 from memscal.model.result import Result
@@ -93,8 +93,8 @@ class Restoration(Result, Checked):
     sigma_zz: FloatArray
     covariance: FloatArray
     comparison: StressComparison | None = None
-    checks: tuple[QualityCheck, ...] = ()
-    messages: tuple[Message, ...] = ()
+    checks: QualityChecks = ()
+    messages: Messages = ()
 
     def __repr__(self) -> str:
         """Return the main numbers in place of thousands of array elements."""

@@ -22,7 +22,7 @@ from memscal.measurement.posterior import film_transfer, posterior_of, reach_of,
 from memscal.measurement.restoration import SAME_LOAD, Expected, Restoration, StressComparison
 from memscal.model import checks as quality
 from memscal.model.arrays import FloatArray
-from memscal.model.checks import Message, QualityCheck, check, chi_square_limit
+from memscal.model.checks import Message, Messages, QualityCheck, check, chi_square_limit
 from memscal.model.indenter import Rod
 from memscal.model.measured_stress import MeasuredScan
 from memscal.model.provenance import accepted_alterations
@@ -296,9 +296,7 @@ def _expected(compared: StressComparison) -> QualityCheck:
     )
 
 
-def restoration_messages(
-    restored: Restoration, checks: Sequence[QualityCheck]
-) -> tuple[Message, ...]:
+def restoration_messages(restored: Restoration, checks: Sequence[QualityCheck]) -> Messages:
     """Return the messages that accompany a result, warnings first."""
     points = restored.points
     messages = quality.failed_check_messages(checks)

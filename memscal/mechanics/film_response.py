@@ -316,10 +316,7 @@ class HankelField:
         return (by_pressure + by_shear).reshape(np.shape(r))
 
 
-_Pair = ArrayPair
-
-
-def _wavenumbers(film: ElasticFilm, reach: float) -> _Pair:
+def _wavenumbers(film: ElasticFilm, reach: float) -> ArrayPair:
     """Return quadrature nodes for layer and base, seen at distances up to ``reach``."""
     # 1.5/h keeps the panels short beside the distance of the transfer functions' poles.
     h = film.thickness
@@ -329,8 +326,8 @@ def _wavenumbers(film: ElasticFilm, reach: float) -> _Pair:
 def _displacements(
     film: ElasticFilm,
     x: FloatArray,
-    wavenumbers: _Pair,
-    transforms: _Pair,  # of pressure and shear, at the wavenumbers
+    wavenumbers: ArrayPair,
+    transforms: ArrayPair,  # of pressure and shear, at the wavenumbers
     half_space: HalfSpaceIntegrals,
 ) -> HalfSpaceIntegrals:
     """Return the depression at ``x`` by p and by q, and the outward displacement by p and by q."""

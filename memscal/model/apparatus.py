@@ -12,7 +12,7 @@ from scipy.special import stdtrit
 from memscal.errors import InputError
 from memscal.model.arrays import FloatArray, FrozenArrays, array_record, keyword_array_record
 from memscal.model.assumptions import Assumption
-from memscal.model.checks import Checked, QualityCheck, state_of_checks
+from memscal.model.checks import Checked, QualityChecks, state_of_checks
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import RoundIndenter
 from memscal.model.instrument import Equipment, LoadCell, StressSensor, User
@@ -230,7 +230,7 @@ class ApparatusData(Checked):
     transfer: TransferFunction
     reconvolution: Reconvolution
     parameters: ParameterSet
-    checks: tuple[QualityCheck, ...]
+    checks: QualityChecks
     film: ElasticFilm | None
     indenter: RoundIndenter | None
     sensor: StressSensor

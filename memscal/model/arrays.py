@@ -2,7 +2,7 @@
 
 import math
 import warnings
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, is_dataclass
 from typing import Any, TypeVar, dataclass_transform
 
@@ -15,6 +15,7 @@ FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.intp]
 BoolArray = NDArray[np.bool_]
 ArrayPair = tuple[FloatArray, FloatArray]
+ArrayFunction = Callable[[FloatArray], FloatArray]
 
 Arrays = dict[str, FloatArray]
 Columns = dict[str, NDArray[Any]]

@@ -179,10 +179,14 @@ class QualityCheck:
         return self.name.removeprefix(self.kind).lstrip("_")
 
 
+QualityChecks = tuple[QualityCheck, ...]
+Messages = tuple[Message, ...]
+
+
 class Checked:
     """A result with quality checks."""
 
-    checks: tuple[QualityCheck, ...]
+    checks: QualityChecks
 
     @property
     def passed(self) -> bool:
@@ -280,7 +284,7 @@ def marked_texts(messages: Iterable[Message]) -> list[str]:
     return [("Warning: " if m.severity == "warning" else "") + m.text for m in messages]
 
 
-def messages_from_json(stored: Sequence[Any]) -> tuple[Message, ...]:
+def messages_from_json(stored: Sequence[Any]) -> Messages:
     """Return messages from a file; a plain text, as older files hold them, is a note."""
     messages = []
     for entry in (e if isinstance(e, Mapping) else {"text": e} for e in stored):

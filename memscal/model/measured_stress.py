@@ -26,7 +26,13 @@ from memscal.model.arrays import (
     keyword_array_record,
     keyword_value_record,
 )
-from memscal.model.checks import NOISE_UNSTATED, Checked, Message, QualityCheck, state_of_checks
+from memscal.model.checks import (
+    NOISE_UNSTATED,
+    Checked,
+    Messages,
+    QualityChecks,
+    state_of_checks,
+)
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import RoundIndenter
 from memscal.model.instrument import Equipment, LoadCell, StressSensor
@@ -290,7 +296,7 @@ class MeasuredStress(Result, Checked, ByContent):
     scans: tuple[MeasuredScan, ...]
     conversion_constant: float
     conversion_constant_uncertainty: float
-    checks: tuple[QualityCheck, ...]
+    checks: QualityChecks
     overridden: tuple[str, ...]
     process: Process
     artifact: SourceFile | None = None
@@ -311,7 +317,7 @@ class MeasuredStress(Result, Checked, ByContent):
         return np.array([profile.load for profile in self.profiles])
 
     @property
-    def messages(self) -> tuple[Message, ...]:
+    def messages(self) -> Messages:
         """Notes and warnings of the measurement, the most serious first."""
         return self.process.messages
 

@@ -7,7 +7,7 @@ from datetime import UTC, datetime
 from typing import Any, Self
 
 from memscal.errors import InputError
-from memscal.model.checks import Message
+from memscal.model.checks import Messages
 from memscal.version import __version__
 
 
@@ -69,7 +69,7 @@ class Process:
     date: str
     configuration: Mapping[str, Any] = field(default_factory=dict)
     environment: Mapping[str, Any] = field(default_factory=dict)
-    messages: tuple[Message, ...] = ()
+    messages: Messages = ()
     input_scan: SourceFile | None = None
     input_reference: SourceFile | None = None
 

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from memscal.errors import InputError
 from memscal.extensions import hook
 from memscal.model import arrays
-from memscal.model.arrays import FloatArray, IndexArray, keyword_array_record
+from memscal.model.arrays import ArrayPair, FloatArray, IndexArray, Values, keyword_array_record
 from memscal.model.correlation import checked_correlation, of_points
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import RoundIndenter
@@ -386,7 +386,7 @@ class Scan:
         return self.y is not None
 
     @property
-    def positions(self) -> tuple[FloatArray, FloatArray]:
+    def positions(self) -> ArrayPair:
         """Position of every voltage along x and y, in m, each like ``u_zz``."""
         along = np.broadcast_to(self.x, self.u_zz.shape)
         if self.y is not None:
@@ -536,7 +536,7 @@ def only_points(scan: Scan, keep: IndexArray, **changes: Any) -> Scan:
     return replace(scan, **(chosen | changes))
 
 
-def _rows(scan: Scan, keep: IndexArray, *names: str) -> dict[str, Any]:
+def _rows(scan: Scan, keep: IndexArray, *names: str) -> Values:
     """Return some rows of the readings, of what is stated like them, and of further arrays."""
     stated = {name: getattr(scan, name) for name in (*names, "branch", "u_zz", *LIKE_SIGNAL)}
     rows = {n: values[keep] for n, values in stated.items() if values is not None}
@@ -544,7 +544,7 @@ def _rows(scan: Scan, keep: IndexArray, *names: str) -> dict[str, Any]:
     return rows
 
 
-def common_circumstances(scans: Sequence[Scan]) -> dict[str, Any]:
+def common_circumstances(scans: Sequence[Scan]) -> Values:
     """Return what gave loads and positions, and who measured, if common to all scans, and when."""
     first = scans[0]
     same_cell = all(first.load_cell.same_as(scan.load_cell) for scan in scans)

@@ -20,7 +20,6 @@ the base does the same work as the forces that hold its nodes; its integral is t
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import cached_property
 from itertools import pairwise
 from typing import Any
@@ -32,7 +31,7 @@ from memscal.axisymmetry.hankel import gauss_between, hankel_transform
 from memscal.errors import DomainError
 from memscal.mechanics.elements.mesh import TriangleMesh, film_triangles
 from memscal.mechanics.surface import SurfaceCompliance, anticlockwise
-from memscal.model.arrays import FloatArray, IndexArray, Values, array_record
+from memscal.model.arrays import ArrayFunction, FloatArray, IndexArray, Values, array_record
 from memscal.model.field_mesh import FieldMesh
 from memscal.model.film import ElasticFilm
 from memscal.progress import Task
@@ -92,9 +91,7 @@ def _sparse(values: FloatArray, columns: IndexArray, count: int) -> csr_array:
     return csr_array((values.ravel(), columns.ravel(), rows), shape=(len(values), count))
 
 
-def smooth(
-    line: QuarticLine, values: FloatArray, parity: int
-) -> Callable[[FloatArray], FloatArray]:
+def smooth(line: QuarticLine, values: FloatArray, parity: int) -> ArrayFunction:
     """Return the even (1) or odd (-1) quintic spline of ``r`` nearest to a quartic's values."""
     # Knots at the corners, nearest in the integral of (.)^2 r dr: that of (.) r dr stays.
     from scipy.interpolate import make_lsq_spline
@@ -361,7 +358,7 @@ class ElementField:
         return hankel_transform(r, self.base(r, order), np.ravel(k), order=order).reshape(k.shape)
 
     @cached_property
-    def _tractions(self) -> tuple[Callable[[FloatArray], FloatArray], ...]:
+    def _tractions(self) -> tuple[ArrayFunction, ...]:
         """Normal and radial traction at the base, in Pa, at radii in film thicknesses."""
         from scipy.sparse.linalg import spsolve
 
