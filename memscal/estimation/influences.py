@@ -20,7 +20,7 @@ from memscal.axisymmetry.kernels import gaussian_transfer
 from memscal.estimation.points import ScanPoints
 from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.reference_spectra import difference, spectrum_difference
-from memscal.mechanics.film_response import base_normal, base_shear
+from memscal.mechanics.film_response import base_response
 from memscal.mechanics.press_rod import is_tabulated, press_rod, stick_and_slide
 from memscal.model.arrays import FloatArray, array_record
 from memscal.model.film import LINEAR, NEO_HOOKEAN
@@ -118,9 +118,9 @@ def _film_changes(
     k = reference.wavenumbers.k
     nothing = np.zeros_like(k)
     x = np.minimum(k * film.thickness, _LARGEST_KH)
-    bonded, _ = base_normal(x, film.poisson_ratio)
+    bonded, _ = base_response(x, film.poisson_ratio)
     sliding = 2 * (np.sinh(x) + x * np.cosh(x)) / (np.sinh(2 * x) + 2 * x)
-    shear, _ = base_shear(x, film.poisson_ratio)
+    shear, _ = base_response(x, film.poisson_ratio, 1)
     changes = {
         "base_slip": (reference.values * (sliding / bonded - 1), nothing),
         "shear_sensitivity": (-reference.values * k * shear / bonded, nothing),

@@ -43,7 +43,7 @@ from memscal.estimation.points import ScanPoints
 from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.reference_spectra import law_at_once, law_sensitivities, rod_spectrum
 from memscal.estimation.voltage_map import VoltageMap
-from memscal.mechanics.film_response import base_normal
+from memscal.mechanics.film_response import base_response
 from memscal.model.arrays import ArrayPair, Arrays, FloatArray, array_record, value_record
 from memscal.model.film import LINEAR, NEO_HOOKEAN, ElasticFilm, more_and_less
 from memscal.model.measured_stress import MeasuredScan
@@ -72,7 +72,7 @@ def film_transfer(set_up: SetUp, wavenumbers: Wavenumbers) -> FloatArray:
 
 def _linear_transfer(set_up: SetUp, wavenumbers: Wavenumbers) -> RadialSpectrum:
     film = set_up.film
-    values, _ = base_normal(wavenumbers.k * film.thickness, film.poisson_ratio)
+    values, _ = base_response(wavenumbers.k * film.thickness, film.poisson_ratio)
     return RadialSpectrum(wavenumbers, values)
 
 
@@ -125,7 +125,7 @@ def _three_orders(
 def _shear_ratio(film: ElasticFilm, k: bytes) -> FloatArray:
     """Normal stress at the base by a shear on the film over that by a pressure, at ``k``."""
     x = np.frombuffer(k) * film.thickness
-    by_pressure, by_shear = base_normal(x, film.poisson_ratio)
+    by_pressure, by_shear = base_response(x, film.poisson_ratio)
     return by_shear / by_pressure
 
 

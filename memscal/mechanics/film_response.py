@@ -73,27 +73,21 @@ def corrections(x: ArrayLike, nu: float) -> tuple[FloatArray, FloatArray, FloatA
     return normal, coupling, radial
 
 
-def base_normal(x: ArrayLike, nu: float) -> ArrayPair:
+def base_response(x: ArrayLike, nu: float, order: int = 0) -> ArrayPair:
     r"""Base stress by a pressure, and tension by an outward traction: T (1 at x = 0) and N.
 
-    :math:`T = 4(1-\nu)(2(1-\nu)c + xs)/D` and :math:`N = 4(1-\nu)(xc + (1-2\nu)s)/D`.
-    """
-    x, decay, denominator, _ = _prepare(x, nu)
-    scale = 4 * (1 - nu) * np.exp(-x)
-    by_pressure = 2 * (1 - nu) * (1 + decay) - x * np.expm1(-2 * x)
-    by_shear = x * (1 + decay) - (1 - 2 * nu) * np.expm1(-2 * x)
-    return scale * by_pressure / denominator, scale * by_shear / denominator
-
-
-def base_shear(x: ArrayLike, nu: float) -> ArrayPair:
-    r"""Shear stress at the base by a pressure, and by a radial traction: S and R.
-
+    :math:`T = 4(1-\nu)(2(1-\nu)c + xs)/D` and :math:`N = 4(1-\nu)(xc + (1-2\nu)s)/D`; of ``order``
+    one the shear stress at the base by a pressure, and by a radial traction: S and R.
     :math:`S = 4(1-\nu)(xc - (1-2\nu)s)/D` and :math:`R = 4(1-\nu)(2(1-\nu)c - xs)/D`.
     """
     x, decay, denominator, _ = _prepare(x, nu)
     scale = 4 * (1 - nu) * np.exp(-x)
-    by_pressure = (1 - 2 * nu) * _x_cosh_minus_sinh(x, decay) + 2 * nu * x * (1 + decay)
-    by_shear = 2 * (1 - nu) * (1 + decay) + x * np.expm1(-2 * x)
+    if order:
+        by_pressure = (1 - 2 * nu) * _x_cosh_minus_sinh(x, decay) + 2 * nu * x * (1 + decay)
+        by_shear = 2 * (1 - nu) * (1 + decay) + x * np.expm1(-2 * x)
+    else:
+        by_pressure = 2 * (1 - nu) * (1 + decay) - x * np.expm1(-2 * x)
+        by_shear = x * (1 + decay) - (1 - 2 * nu) * np.expm1(-2 * x)
     return scale * by_pressure / denominator, scale * by_shear / denominator
 
 
@@ -170,7 +164,7 @@ def base_spectrum(
     nu = film.poisson_ratio
     p = traction.pressure_transform(k)
     q = traction.shear_transform(k)
-    by_pressure, by_shear = base_shear(x, nu) if order else base_normal(x, nu)
+    by_pressure, by_shear = base_response(x, nu, order)
     return -(by_pressure * p + by_shear * q) if order else by_pressure * p - by_shear * q
 
 

@@ -14,7 +14,7 @@ from memscal.axisymmetry.hankel import gauss_between
 from memscal.estimation.points import measured_points
 from memscal.measurement.posterior import PressureShape, pressure_shapes, weighed_shapes
 from memscal.measurement.restore import gaussian_pressure
-from memscal.mechanics.film_response import base_normal
+from memscal.mechanics.film_response import base_response
 
 K = np.linspace(0.0, 6e3, 41)
 WIDTH = 1.1e-3
@@ -34,7 +34,7 @@ def test_the_transform_is_that_of_pressure_and_shear_through_the_film(exponent, 
     outward = shear * pressure * r / (2 * WIDTH)
     x = K * EXACT_FILM.thickness
     nu = EXACT_FILM.poisson_ratio
-    film, by_shear = base_normal(x, nu)
+    film, by_shear = base_response(x, nu)
     expected = film * hankel(0, pressure, r, weights)
     expected -= by_shear * hankel(1, outward, r, weights)
     shape = PressureShape(exponent, shear, EXACT_FILM)
