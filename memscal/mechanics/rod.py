@@ -37,40 +37,6 @@ from memscal.model.arrays import BoolArray, FloatArray, array_record
 from memscal.model.film import ElasticFilm
 
 
-def rod_integrals(
-    rho: FloatArray, pressure_terms: FloatArray, shear_terms: FloatArray
-) -> HalfSpaceIntegrals:
-    """Return the transforms' integrals times J0 and J1 at radii ``rho`` in units of the rod's."""
-    # By j_2n(x) = (-1)^n int_0^1 P_2n(t) cos(xt) dt, of odd order with sines, and the Hankel
-    # transforms of cosine and sine (Gradshteyn and Ryzhik 6.671); exact by Gauss quadrature.
-    even = _series(pressure_terms, 0)
-    odd = _series(shear_terms, 1)
-    nodes, weights = np.polynomial.legendre.leggauss(max(even.size, odd.size) + 24)
-    share = (nodes + 1) / 2
-    weights = weights / 2
-
-    # t = c sin(theta) below c = min(rho, 1): the root sqrt(rho^2 - t^2) cancels against dt.
-    inner = np.minimum(rho, 1.0)
-    angle = np.arcsin(np.divide(inner, rho, out=np.ones_like(rho), where=rho > 0))
-    t = rho[:, None] * np.sin(angle[:, None] * share)
-    d_theta = angle[:, None] * weights
-    pressed = legendre.legval(t, even)
-    sheared = legendre.legval(t, odd)
-    w_by_p = np.sum(d_theta * pressed, axis=1)
-    inverse = np.divide(1.0, rho, out=np.zeros_like(rho), where=rho > 0)
-    u_by_q = np.sum(d_theta * t * sheared, axis=1) * inverse
-
-    # t^2 = rho^2 + s^2 beyond: the root sqrt(t^2 - rho^2) = s cancels against dt = s ds / t.
-    top = np.sqrt(np.maximum(1 - rho**2, 0.0))
-    t = np.sqrt(inner[:, None] ** 2 + (top[:, None] * share) ** 2)
-    d_s = top[:, None] * weights
-    reciprocal = np.divide(1.0, t, out=np.zeros_like(t), where=t > 0)
-    w_by_q = np.sum(d_s * legendre.legval(t, odd) * reciprocal, axis=1)
-    beyond = np.sum(d_s * legendre.legval(t, even), axis=1)
-    whole = legendre.legval(1.0, legendre.legint(even, lbnd=0))
-    return w_by_p, w_by_q, (whole - beyond) * inverse, u_by_q
-
-
 def _series(terms: FloatArray, first: int) -> FloatArray:
     """Return the Legendre series of the finite Fourier transform."""
     series = np.zeros(2 * max(terms.size, 1))
@@ -160,10 +126,36 @@ class RodTraction:
 
     def half_space_integrals(self, r: FloatArray) -> HalfSpaceIntegrals:
         """Return the four integrals of :class:`InterfaceTraction` at ``r`` (m), in Pa m."""
+        rho = r / self.radius
+        # By j_2n(x) = (-1)^n int_0^1 P_2n(t) cos(xt) dt, of odd order with sines, and the Hankel
+        # transforms of cosine and sine (Gradshteyn and Ryzhik 6.671); exact by Gauss quadrature.
+        even = _series(self.pressure_terms, 0)
+        odd = _series(self.shear_terms, 1)
+        nodes, weights = np.polynomial.legendre.leggauss(max(even.size, odd.size) + 24)
+        share = (nodes + 1) / 2
+        weights = weights / 2
+
+        # t = c sin(theta) below c = min(rho, 1): the root sqrt(rho^2 - t^2) cancels against dt.
+        inner = np.minimum(rho, 1.0)
+        angle = np.arcsin(np.divide(inner, rho, out=np.ones_like(rho), where=rho > 0))
+        t = rho[:, None] * np.sin(angle[:, None] * share)
+        d_theta = angle[:, None] * weights
+        pressed = legendre.legval(t, even)
+        sheared = legendre.legval(t, odd)
+        w_by_p = np.sum(d_theta * pressed, axis=1)
+        inverse = np.divide(1.0, rho, out=np.zeros_like(rho), where=rho > 0)
+        u_by_q = np.sum(d_theta * t * sheared, axis=1) * inverse
+
+        # t^2 = rho^2 + s^2 beyond: the root sqrt(t^2 - rho^2) = s cancels against dt = s ds / t.
+        top = np.sqrt(np.maximum(1 - rho**2, 0.0))
+        t = np.sqrt(inner[:, None] ** 2 + (top[:, None] * share) ** 2)
+        d_s = top[:, None] * weights
+        reciprocal = np.divide(1.0, t, out=np.zeros_like(t), where=t > 0)
+        w_by_q = np.sum(d_s * legendre.legval(t, odd) * reciprocal, axis=1)
+        beyond = np.sum(d_s * legendre.legval(t, even), axis=1)
+        whole = legendre.legval(1.0, legendre.legint(even, lbnd=0))
+        u_by_p = (whole - beyond) * inverse
         unit = self.load / (2 * np.pi * self.radius)
-        w_by_p, w_by_q, u_by_p, u_by_q = rod_integrals(
-            r / self.radius, self.pressure_terms, self.shear_terms
-        )
         return w_by_p * unit, w_by_q * unit, u_by_p * unit, u_by_q * unit
 
     def _transform(self, terms: FloatArray, first: int, k: FloatArray) -> FloatArray:
