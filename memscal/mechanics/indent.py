@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from functools import partial
-from typing import overload
+from typing import TypedDict, Unpack, overload
 
 import numpy as np
 
@@ -29,6 +29,17 @@ _FEWEST_RINGS = 16
 _SAME = 1e-6
 
 
+class _Options(TypedDict, total=False):
+    friction: float
+    loading: str
+    backend: str
+    interface: Interface | None
+    strain: str | None
+    film_radius: float | None
+    rings: int | None
+    progress: Listener
+
+
 @overload
 def indent(
     film: ElasticFilm,
@@ -36,14 +47,7 @@ def indent(
     *,
     load: float | None = None,
     depth: float | None = None,
-    friction: float = 0.0,
-    loading: str = "incremental",
-    backend: str = "hankel",
-    interface: Interface | None = None,
-    strain: str | None = None,
-    film_radius: float | None = None,
-    rings: int | None = None,
-    progress: Listener = None,
+    **options: Unpack[_Options],
 ) -> Contact: ...
 @overload
 def indent(
@@ -52,14 +56,7 @@ def indent(
     *,
     load: _Several | None = None,
     depth: _Several | None = None,
-    friction: float = 0.0,
-    loading: str = "incremental",
-    backend: str = "hankel",
-    interface: Interface | None = None,
-    strain: str | None = None,
-    film_radius: float | None = None,
-    rings: int | None = None,
-    progress: Listener = None,
+    **options: Unpack[_Options],
 ) -> list[Contact]: ...
 @reported
 @single_threaded()
