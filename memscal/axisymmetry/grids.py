@@ -105,8 +105,7 @@ class EvenGrid:
 
     def to_period(self, field: FloatArray) -> FloatArray:
         """Mirror the quarter to one period: 2 (count - 1) points, the axis at the first."""
-        right = np.concatenate([field, field[:, -2:0:-1]], axis=1)
-        return np.concatenate([right, right[-2:0:-1]], axis=0)
+        return np.pad(field, (0, self.count - 2), mode="reflect")
 
     def from_quotient(self, period: FloatArray) -> FloatArray:
         """Return the even part of a period, as a quarter plane."""
@@ -116,8 +115,7 @@ class EvenGrid:
 
     def to_image(self, field: FloatArray) -> FloatArray:
         """Mirror the quarter to the whole plane: odd size, axis at the central pixel."""
-        right = np.concatenate([field[:, :0:-1], field], axis=1)
-        return np.concatenate([right[:0:-1], right], axis=0)
+        return np.pad(field, (self.count - 1, 0), mode="reflect")
 
     def from_image(self, image: FloatArray) -> FloatArray:
         """Return the even part of an image, as a quarter plane."""
@@ -223,8 +221,9 @@ class Lattice:
 
         r = self.x[self.x.size // 2 :]
         angle = 2 * np.pi * np.arange(_DIRECTIONS) / _DIRECTIONS
-        rows = (np.outer(r, np.sin(angle)) - self.y[0]) / (self.y[1] - self.y[0])
-        columns = (np.outer(r, np.cos(angle)) - self.x[0]) / (self.x[1] - self.x[0])
+        dy, dx = self.spacing
+        rows = (np.outer(r, np.sin(angle)) - self.y[0]) / dy
+        columns = (np.outer(r, np.cos(angle)) - self.x[0]) / dx
         samples = map_coordinates(field, [rows, columns], order=3, mode="nearest")
         return r, samples.mean(axis=1)
 

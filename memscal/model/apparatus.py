@@ -241,9 +241,9 @@ class ApparatusData(Checked):
     kernel_changes: Mapping[str, FloatArray] = dataclass_field(default_factory=dict)
     assumptions: tuple[Assumption, ...] = ()
     other: OtherEstimate | None = None
-    load_cell: LoadCell = dataclass_field(default_factory=LoadCell)
-    stage: Equipment = dataclass_field(default_factory=Equipment)
-    user: User = dataclass_field(default_factory=User)
+    load_cell: LoadCell = LoadCell()
+    stage: Equipment = Equipment()
+    user: User = User()
     start_time: str = ""
     end_time: str = ""
 

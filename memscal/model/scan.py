@@ -251,10 +251,10 @@ class Scan:
     indenter: RoundIndenter | None = None
     film: ElasticFilm | None = None
     unit: str = "V"
-    sensor: StressSensor = field(default_factory=StressSensor)
-    load_cell: LoadCell = field(default_factory=LoadCell)
-    stage: Equipment = field(default_factory=Equipment)
-    user: User = field(default_factory=User)
+    sensor: StressSensor = StressSensor()
+    load_cell: LoadCell = LoadCell()
+    stage: Equipment = Equipment()
+    user: User = User()
     y: FloatArray | None = None
     repeat: NDArray[np.int64] | None = None
     branch: NDArray[np.int64] | None = None
@@ -479,19 +479,23 @@ class Scan:
         for name, kind in (("u_zz", "voltage"), ("time", "time")):
             values = getattr(self, name)
             if values is not None and np.any(np.isinf(values)):
-                problem = f"{name} holds an infinite {kind}."
-                raise InputError(problem, cure="Mark missing points with NaN.")
+                raise InputError(
+                    f"{name} holds an infinite {kind}.", cure="Mark missing points with NaN."
+                )
         for name in ("u_zz_errors", "normal_load_errors"):
             errors = getattr(self, name)
             if errors is not None and np.any((errors < 0) | np.isinf(errors)):
-                problem = "holds a standard uncertainty that is negative or infinite."
-                raise InputError(f"{name} {problem}")
+                raise InputError(
+                    f"{name} holds a standard uncertainty that is negative or infinite."
+                )
         loads = self.normal_load
         if loads is None:
             return
         if np.any((loads <= 0) | np.isinf(loads)):
-            problem = "normal_load holds a load that is infinite or not above zero."
-            raise InputError(problem, cure="Mark points without contact as missing (NaN).")
+            raise InputError(
+                "normal_load holds a load that is infinite or not above zero.",
+                cure="Mark points without contact as missing (NaN).",
+            )
         if np.isnan(loads).all():
             raise InputError(
                 "normal_load is missing (NaN) at every point.",
