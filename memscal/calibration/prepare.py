@@ -24,7 +24,7 @@ from memscal.estimation.set_up import (
 )
 from memscal.mechanics.contact import BaseStress, Contact, stress_table
 from memscal.mechanics.press_rod import press_rod
-from memscal.model.arrays import Values, array_record, keyword_array_record
+from memscal.model.arrays import array_record, keyword_array_record
 from memscal.model.film import LINEAR
 from memscal.model.notation import RELATIVE, Reading
 from memscal.model.provenance import accepted_alterations
@@ -97,12 +97,13 @@ def prepare(as_stated: Sequence[Scan], request: Request) -> Prepared:
     if request.relative and request.reference is None:
         loaded = tuple(map(_with_some_load, as_stated))
     references = _references(request.reference, as_stated, request)
+    scans = []
+    stated = []
     for scan, given in zip(loaded, references, strict=True):
         require_calibration_rod(scan, given)
-    scans = [_with_law(s, r, request) for s, r in zip(loaded, references, strict=True)]
-    stated = [r or s.reference for s, r in zip(scans, references, strict=True)]
-    if request.relative:
-        scans = [_without_loads(s, r) for s, r in zip(scans, stated, strict=True)]
+        scan = _with_law(scan, given, request)
+        stated.append(given or scan.reference)
+        scans.append(_without_loads(scan, stated[-1]) if request.relative else scan)
     alternatives = None
     if request.alternative is not None:
         alternatives = _references(request.alternative, scans, replace(request, pixel_size=None))
@@ -111,14 +112,14 @@ def prepare(as_stated: Sequence[Scan], request: Request) -> Prepared:
     )
     files = (*as_stated, *references, *(alternatives or ()))
     overridden[:0] = accepted_alterations(*(getattr(file, "source", None) for file in files))
-    scans = [with_film_of(r, s) for s, r in zip(scans, references, strict=True)]
+    scans = list(map(with_film_of, references, scans))
     require_one_kind(stated, alternatives or ())
     owners: Sequence[int] | None = None
     if not any(stated) and any(s.set_up.film.law != LINEAR for s in scans):
         # Under another law than the linear one each load has a stress of its own shape.
         scans, owners = scans_by_load(scans)
         references = [None] * len(scans)
-    stresses = [reference_profile(s, r) for s, r in zip(scans, references, strict=True)]
+    stresses = list(map(reference_profile, scans, references))
     peak = None
     per = stresses[0].unit
     if request.relative:
@@ -181,9 +182,13 @@ def _with_some_load(scan: Scan) -> Scan:
 
 def _without_loads(scan: Scan, stress: BaseStress | None) -> Scan:
     """Return the scan without loads; a rod that has to be solved keeps its nominal one."""
-    load = None if stress else scan.load
-    loads: Values = {"normal_load": None, "normal_load_errors": None}
-    return replace(scan, load=load, load_uncertainty=None, **loads)
+    return replace(
+        scan,
+        load=None if stress else scan.load,
+        load_uncertainty=None,
+        normal_load=None,
+        normal_load_errors=None,
+    )
 
 
 def _references(
@@ -208,9 +213,9 @@ def _read(reference: Reference, load: float, request: Request) -> BaseStress | N
     if isinstance(reference, str | PathLike):
         from memscal.formats.reference import read_reference
 
-        accepted = request.accept_altered
-        size = request.pixel_size
-        reference = read_reference(reference, pixel_size=size, accept_altered=accepted)
+        reference = read_reference(
+            reference, pixel_size=request.pixel_size, accept_altered=request.accept_altered
+        )
     elif isinstance(reference, IdealReference | StressField):
         reference = reference.profile()
     if isinstance(reference, StressProfile) and reference.form is not None:

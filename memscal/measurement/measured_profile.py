@@ -200,11 +200,15 @@ class _Found:
 
 def _found(scan: Scan, apparatus: ApparatusFunction, points: ScanPoints) -> _Found:
     estimate, _ = gaussian_pressure(scan, apparatus, points)
-    signal = estimate.signal
-    rest = estimate.weighed.residual
-    weight = estimate.outlier_weight
-    count = estimate.gaussian.jacobian.shape[1]
-    return _Found(estimate.centre, estimate.distance, signal, rest, weight, count, estimate)
+    return _Found(
+        estimate.centre,
+        estimate.distance,
+        estimate.signal,
+        estimate.weighed.residual,
+        estimate.outlier_weight,
+        estimate.gaussian.jacobian.shape[1],
+        estimate,
+    )
 
 
 def _found_quickly(scan: Scan, apparatus: ApparatusFunction, points: ScanPoints) -> _Found:
@@ -212,12 +216,10 @@ def _found_quickly(scan: Scan, apparatus: ApparatusFunction, points: ScanPoints)
     model = forward_model(points, [unit_force(scan, apparatus, points)[0]])
     with undetermined():
         fit = fit_gaussian_to_points(model, stated_weights(points))
-    distance = fit.geometry.radius
     signal = fit.conversion_constant * fit.jacobian[:, 0]
     rest = points.u - fit.predicted
-    weight = np.ones_like(rest)
     count = fit.jacobian.shape[1]
-    return _Found(fit.centre[0], distance, signal, rest, weight, count)
+    return _Found(fit.centre[0], fit.geometry.radius, signal, rest, np.ones_like(rest), count)
 
 
 @array_record

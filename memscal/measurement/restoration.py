@@ -107,6 +107,11 @@ class Restoration(Result, Checked):
         """The measured points."""
         return self.posterior.estimate.points
 
+    @property
+    def sigma_zz_errors(self) -> FloatArray:
+        """Standard uncertainty of ``sigma_zz``, in Pa."""
+        return np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+
     def stress(self, r: ArrayLike) -> FloatArray:
         """Return the restored stress at radii ``r`` (m, any shape), in Pa.
 
@@ -244,7 +249,7 @@ class Restoration(Result, Checked):
         return StressProfile(
             r=self.r,
             sigma_zz=self.sigma_zz,
-            sigma_zz_errors=np.sqrt(np.maximum(np.diag(self.covariance), 0.0)),
+            sigma_zz_errors=self.sigma_zz_errors,
             load=self.scan.stated_load,
             film=self.scan.film,
             indenter=self.scan.indenter,
@@ -311,7 +316,6 @@ def _compared(restored: Restoration, stress: StressProfile | Contact) -> StressC
         spectrum = hankel_transform(stress.r, stress.sigma_zz, wavenumbers.k) / stress.load
     calculated = scan.stated_load * wavenumbers.synthesise(spectrum, restored.r)
     peak = float(np.abs(calculated).max())
-    u = np.sqrt(np.maximum(np.diag(restored.covariance), 0.0))
     apart = np.abs(restored.sigma_zz - calculated)
     chi_square, degrees = _direct(restored, spectrum)
     return StressComparison(
@@ -322,7 +326,9 @@ def _compared(restored: Restoration, stress: StressProfile | Contact) -> StressC
         limit=quality.chi_square_limit(degrees) / degrees,
         p_value=float(chdtrc(degrees, chi_square)),
         difference=float(apart.max()) / peak,
-        within=float(np.mean(apart <= np.hypot(_EXPANDED * u, _NEGLIGIBLE * peak))),
+        within=float(
+            np.mean(apart <= np.hypot(_EXPANDED * restored.sigma_zz_errors, _NEGLIGIBLE * peak))
+        ),
     )
 
 

@@ -177,7 +177,7 @@ class Interface:
     (False, True)
     """
 
-    normal: GreenwoodTripp | ExponentialCompliance | None = None
+    normal: NormalLaw | None = None
     slip_length: float = 0.0
 
     def __post_init__(self) -> None:
