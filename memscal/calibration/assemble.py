@@ -56,12 +56,11 @@ def assemble(
     quotient = solution.deconvolution.quotient
     k, transfer = solution.fields.grid.axis_transfer(quotient.values)
     modulus = np.abs(transfer) / solution.deconvolution.conversion_constant
-    resolved = solution.band.resolved
     return ApparatusFunction(
         plane=_plane(solution, results),
         radial_profile=_radial(solution, solution.deconvolution, results),
         transfer=TransferFunction(
-            k, modulus, results.transfer_errors, quotient.window[0], resolved
+            k, modulus, results.transfer_errors, quotient.window[0], solution.band.resolved
         ),
         reconvolution=_reconvolution(solution),
         parameters=results.parameters,

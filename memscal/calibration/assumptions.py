@@ -156,10 +156,9 @@ def _correlations(solution: Solution, results: Results) -> dict[str, float]:
     order = np.lexsort((points.x, points.y, points.repeat))
     passes = points.repeat[order]
     by_noise = results.by_voltage.dense() * estimate.noise
-    names = results.parameters.names
     sizes = {}
     for parameter in MOVED:
-        row = by_noise[names.index(parameter), order]
+        row = by_noise[results.parameters.names.index(parameter), order]
         added = np.zeros_like(_CORRELATIONS)
         for number in np.unique(passes):
             alike = row[passes == number]

@@ -100,10 +100,9 @@ def _reconvolutions(solution: Solution) -> Iterator[QualityCheck]:
         p_value = float(chdtrc(fitted.degrees, fitted.chi2_reduced * fitted.degrees))
     # Both are of the same points.
     limit = _misfit_limit(solution.estimate, fitted.degrees)
-    chi2 = solution.deconvolution.misfit.chi2_reduced
     yield check(
         "reconvolution",
-        chi2,
+        solution.deconvolution.misfit.chi2_reduced,
         limit,
         "Reduced chi-square of the scan against the G found, convolved with the reference. A "
         f"failure means that {removed}, or that the scan is no convolution of the reference: "
@@ -187,17 +186,15 @@ def _agreement(
 
 def _shape(solution: Solution, parameters: ParameterSet) -> Iterator[QualityCheck]:
     """Look for what divisions that went wrong do to G: spikes, lobes and ripples."""
-    estimate = solution.estimate
     deconvolution = solution.deconvolution
-    a = deconvolution.conversion_constant
     g = deconvolution.g
     ratios = [parameters["fwhm"] / (_HALF_WIDTH * parameters[name]) for name in _WIDTHS]
     widest = max(max(ratio, 1 / ratio) for ratio in ratios)
     share = ring_areas(g.r) * g.radial
     negative = float(np.maximum(-share, 0.0).sum() / np.abs(share).sum())
     k, transfer = solution.fields.grid.axis_transfer(deconvolution.quotient.values)
-    power = k * np.abs(transfer / a) ** 2
-    end = max(solution.band.resolved, solution.band.relevant, 2 / estimate.gaussian.sigma)
+    power = k * np.abs(transfer / deconvolution.conversion_constant) ** 2
+    end = max(solution.band.resolved, solution.band.relevant, 2 / solution.estimate.gaussian.sigma)
     rough = float(power[k > _BEYOND * end].sum() / power.sum())
     cure = "take method white-noise or bayesian, or more regularisation"
     # 2.5 by simulation, docs/checks.md: beyond sound results, in which G may be a disc or a ring.
@@ -230,7 +227,6 @@ def _field_shape(solution: Solution, results: Results) -> Iterator[QualityCheck]
     """Look over the plane, of a raster, for lobes of G and for residuals that are no noise."""
     fields = solution.fields
     estimate = solution.estimate
-    points = estimate.points
     if not isinstance(fields, RasterFields) or not fields.index[0].size:
         return
     g = solution.deconvolution.g.image
@@ -245,13 +241,12 @@ def _field_shape(solution: Solution, results: Results) -> Iterator[QualityCheck]
         )
         yield check("field_lobes", max(lobe, 0.0), _LOBE, meaning)
     weight = estimate.outlier_weight
-    left = weight * (points.u - estimate.predicted)
+    left = weight * (estimate.points.u - estimate.predicted)
     noise = solution.band.excess * weight**0.5 * estimate.noise
     degrees = estimate.raster_noise.degrees if estimate.raster_noise else _WELL_KNOWN
-    worst = unexplained.ring_test(left, noise, fields.index, degrees)
     yield _tested(
         "field_residuals",
-        worst,
+        unexplained.ring_test(left, noise, fields.index, degrees),
         "Power of the Bayesian fit's residuals over the plane in one ring of wavenumbers, over "
         "that of the noise: the ring where chance makes it least likely. A failure means that the "
         "form of G leaves a structure of the scan, and that the baseline, with it A, is drawn "
@@ -274,10 +269,9 @@ def _set_up(solution: Solution) -> Iterator[QualityCheck]:
         )
         yield check("width_over_thickness", sigma / film.thickness, 3.0, meaning)
     resolved = solution.band.resolved
-    left = gaussian_transfer(np.array(resolved), sigma)
     yield check(
         "resolved_band",
-        float(left),
+        float(gaussian_transfer(np.array(resolved), sigma)),
         0.5,
         "Transfer function of the fitted Gaussian at the resolved wavenumber, here "
         f"{resolved * 1e-3:.3g} rad/mm: up to there, the posterior standard uncertainty of "
@@ -286,19 +280,17 @@ def _set_up(solution: Solution) -> Iterator[QualityCheck]:
         "than half of G's spectrum: average repeats or raise the load.",
     )
     # A shear falls off more slowly: of the paper's rod 6.5 % lie beyond four film thicknesses.
-    most = 0.10 if points.order else 0.05
     yield check(
         "tail_share",
         solution.tail_share,
-        most,
+        0.10 if points.order else 0.05,
         "Share of the voltage's integral that lies beyond the scan and is extrapolated. A failure "
         "means that A rests on the extrapolation: scan farther.",
     )
     last = 1 + int(points.free[0].sum())
-    change = 2 * np.abs(estimate.drifts[1:last]).max() / estimate.largest_signal
     yield check(
         "baseline_drift",
-        change,
+        2 * np.abs(estimate.drifts[1:last]).max() / estimate.largest_signal,
         0.05,
         "Change of the baseline across the scan over the largest signal. It is fitted and removed "
         "as a line that is straight or a little curved; a failure means that what is left of it "
@@ -388,7 +380,6 @@ def _unexplained(estimate: ProfileEstimate, results: Results) -> Iterator[Qualit
     cause += "." if estimate.slow else "; uncertainties are too small until then."
     slow = estimate.slow or slow_noise(estimate, residuals)
     found = f" {slow_noise_text(estimate, slow, results)}" if slow else ""
-    neighbours = unexplained.neighbour_correlation_test(residuals)
     yield _tested(
         "residual_steps",
         unexplained.steps_test(residuals),
@@ -397,7 +388,7 @@ def _unexplained(estimate: ProfileEstimate, results: Results) -> Iterator[Qualit
     )
     yield _tested(
         "residual_correlation",
-        neighbours,
+        unexplained.neighbour_correlation_test(residuals),
         "Correlation of each residual with its neighbours along the scan, halved for each step "
         f"farther, over what chance gives on average. A failure means that residuals are "
         f"alike: {cause}{found}",
@@ -418,10 +409,9 @@ def _bayes_factor(estimate: ProfileEstimate) -> QualityCheck:
             kinds[hypothesis.kind] = kinds.get(hypothesis.kind, 0.0) + float(departure)
     kind = max(kinds, key=lambda name: kinds[name])
     share = kinds[kind] / max(sum(kinds.values()), 1e-300)
-    value = float(departed - weighed.log_marginals[0])
     return check(
         "gaussian_evidence",
-        value,
+        departed - weighed.log_marginals[0],
         _LOG_BAYES_LIMIT,
         "Natural logarithm of the Bayes factor for a departure of G from a Gaussian; below "
         "zero it is in favour of the Gaussian, and gaussian_sigma may be used. A failure "
@@ -518,11 +508,10 @@ def _runs(estimate: ProfileEstimate) -> Iterator[QualityCheck]:
     largest = estimate.largest_signal
     distance = runs.distance / reading.scale
     apart = format_measured(distance, runs.error / reading.scale, reading.unit)
-    limit = max(_OFFSET, runs.offset.limit**0.5 * runs.error / largest)
     yield check(
         "offset_agreement",
         abs(runs.distance) / largest,
-        limit,
+        max(_OFFSET, runs.offset.limit**0.5 * runs.error / largest),
         "Difference of a baseline from those of all other repeats of all scans, over the largest "
         f"signal: that of number {runs.moved + 1} of {runs.count} is off by {apart}. A failure "
         "means that the sensor's offset moved between them, beyond chance: let it warm up, and "
@@ -531,12 +520,10 @@ def _runs(estimate: ProfileEstimate) -> Iterator[QualityCheck]:
         runs.offset.p_value,
     )
     stated = "" if estimate.points.u_errors is None else ", each over what is stated"
-    limit = max(quality.NOISE_LIMIT, runs.noise.limit**0.5)
-    ratio = runs.noise.value**0.5
     yield check(
         "noise_agreement",
-        ratio,
-        limit,
+        runs.noise.value**0.5,
+        max(quality.NOISE_LIMIT, runs.noise.limit**0.5),
         f"Ratio of the scatter of one repeat of a scan to that of all others{stated}, or back: "
         f"number {runs.noisy + 1} of {runs.count} has {'more' if runs.louder else 'less'}. A "
         "failure means that their noise differs beyond chance, so that weights and uncertainties "

@@ -47,7 +47,6 @@ def drawn_scatter(solution: Solution) -> DrawnScatter | None:
     estimate = solution.estimate
     model = estimate.model
     predicted = estimate.predicted
-    basis = estimate.basis
     noise = estimate.noise / estimate.outlier_weight**0.5
     for _ in range(count):
         # Noise of the voltages (n,), in V, with which the estimate moves to first order.
@@ -58,7 +57,7 @@ def drawn_scatter(solution: Solution) -> DrawnScatter | None:
         new_seed = int(rng.integers(2**32))
         change = weighed.gain @ error
         drawn_model = replace(model, points=replace(model.points, u=predicted + error))
-        left = error - basis.voltages(model, estimate.gaussian, change)
+        left = error - estimate.basis.voltages(model, estimate.gaussian, change)
         drawn = replace(weighed, mean=weighed.mean + change, residual=left)
         moved = replace(estimate, model=drawn_model, weighed=drawn)
         try:

@@ -120,10 +120,9 @@ def _posterior_variances(
     estimate = solution.estimate
     kernels = _kernels(estimate, *axes)
     gain = estimate.weighed.gain
-    integrals = estimate.basis.integrals
     variances = []
     for columns in (estimate.scattered(gain), np.hstack([estimate.fixed_root, gain @ inputs])):
-        changes = kernels(columns) - np.outer(g, integrals @ columns)
+        changes = kernels(columns) - np.outer(g, estimate.basis.integrals @ columns)
         variances.append(np.sum(changes**2, axis=1))
     return np.array(variances) / deconvolution.conversion_constant**2
 

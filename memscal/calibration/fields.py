@@ -150,8 +150,9 @@ class RasterFields:
         """Place the raster, continued by its smoothed profile; a field that is divided is even."""
         points = estimate.points
         # Of several rasters there is no one field of voltages.
-        single = points.as_raster
-        lattice = even_lattice(points.x, points.y, points.places[0].count) if single else None
+        lattice = None
+        if points.as_raster:
+            lattice = even_lattice(points.x, points.y, points.places[0].count)
         even = lattice is not None
         if lattice is None and divided:
             raise InputError(
@@ -226,18 +227,16 @@ class RasterFields:
     def gain(self, smoothed: SmoothedProfile) -> VoltageMap:
         """Derivative of the field's transform by the voltages, (k, n), its mean over directions."""
         # The transform is a sum over the lattice: of the points, and of the profile elsewhere.
-        points = smoothed.estimate.points
-        k = smoothed.estimate.model.k
-        weights = smoothed.spectrum.wavenumbers.weights
+        estimate = smoothed.estimate
         share = self.share(smoothed)
         profiled = np.ones_like(self.voltage.values)
-        np.subtract.at(profiled, self.index, share * points.load)
+        np.subtract.at(profiled, self.index, share * estimate.points.load)
         radius = self.grid.radius
-        table = wave_table(0, False, float(radius.max()), k.tobytes())
+        table = wave_table(0, False, float(radius.max()), estimate.model.k.tobytes())
         everywhere = table.interpolation(radius.ravel())
         # J0(k r) J0(k' r) over what has something of the profile, by the table's splines.
         both = (everywhere.T @ everywhere.multiply(profiled.reshape(-1, 1))) @ table.spline.c
-        elsewhere = (table.spline.c.T @ both) * weights
+        elsewhere = (table.spline.c.T @ both) * smoothed.spectrum.wavenumbers.weights
         own = table.interpolation(radius[self.index]).multiply(share[:, None]).tocsr()
         by_points = VoltageMap(((table.spline.c.T, own),))
         if share.size <= DENSE:

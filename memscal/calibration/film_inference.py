@@ -110,7 +110,6 @@ def weigh_laws(solution: Solution) -> FilmLawComparison | None:
     films = [film_of(stress) for stress in solution.stresses]
     stated = {(film.law, film.mooney_rivlin_ratio) if film else ("", None) for film in films}
     reference, ratio = stated.pop() if len(stated) == 1 else ("", None)
-    channel = solution.estimate.points.channel
     solutions = {}
     for law in dict.fromkeys((reference or LINEAR, LINEAR, NEO_HOOKEAN)):
         known = ratio if law == reference else None
@@ -124,7 +123,9 @@ def weigh_laws(solution: Solution) -> FilmLawComparison | None:
         elif law == LINEAR or all(is_tabulated(*scan.set_up) for scan in scans):
             stresses = [press_rod(*scan.set_up) for scan in scans]
             with suppress(MemscalError):  # no apparatus function may explain the scans by it
-                solutions[law] = solve(scans, stresses, solution.method, channel)
+                solutions[law] = solve(
+                    scans, stresses, solution.method, solution.estimate.points.channel
+                )
     if len(solutions) < 2:
         return None
     estimates = [by_law.estimate for by_law in solutions.values()]
@@ -267,7 +268,6 @@ def free_thickness(solution: Solution) -> FreeThickness:
     u = np.array([film.thickness_uncertainty or 0.0 for film in films])
     points = [estimate.points.only(i) for i in range(len(scans))]
     inputs = _input_columns(solution, THICKNESS)
-    noise = estimate.noise_scale
     nodes = estimate.model.reference.wavenumbers
 
     def log_posterior(z: FloatArray) -> FloatArray:
@@ -279,7 +279,8 @@ def free_thickness(solution: Solution) -> FreeThickness:
             set_up = scan.set_up
             rods.append(press_rod(*set_up._replace(film=varied[set_up.film])))
         model = ForwardModel(estimate.points, reference_spectra(rods, points, nodes))
-        evidences = log_marginal_likelihood(replace(estimate, model=model), inputs, noise)
+        varied_estimate = replace(estimate, model=model)
+        evidences = log_marginal_likelihood(varied_estimate, inputs, estimate.noise_scale)
         return evidences - z @ z / 2
 
     # Sums over a grid, which are good to 1e-2 while its step is at most twice the width of a normal

@@ -167,8 +167,9 @@ def _varying_gain(estimate: ProfileEstimate) -> float:
     repeats = np.unique(points.repeat)
     if repeats.size == 1 or points.owner.any():
         return 0.0
-    lines = estimate.model.straight_columns
-    columns = np.column_stack([estimate.signal, estimate.weighed.residual, lines])
+    columns = np.column_stack(
+        [estimate.signal, estimate.weighed.residual, estimate.model.straight_columns]
+    )
     columns = points.standardised(columns, estimate.weights / estimate.noise_scale**2)
     products = []
     for repeat in repeats:
@@ -407,8 +408,8 @@ def expected_values(solution: Solution) -> dict[str, float]:
 
 def drawn_about(solution: Solution) -> FloatArray:
     """Voltages (n,), in V, about which scans are drawn: the prediction of the best estimate."""
-    divided = solution.deconvolution.divided
-    return solution.estimate.predicted if divided else solution.deconvolution.predicted
+    deconvolution = solution.deconvolution
+    return solution.estimate.predicted if deconvolution.divided else deconvolution.predicted
 
 
 def _budget(

@@ -41,7 +41,6 @@ def fit_gaussian(g: Field, start: float | None = None) -> float:
     0.6
     """
     r = g.r
-    radial = g.radial
     root = np.sqrt(r)
     narrowest = 0.5 * float(r[1] - r[0])
     if start is None:
@@ -51,7 +50,7 @@ def fit_gaussian(g: Field, start: float | None = None) -> float:
         """Misfit at a width over ``start``, and its slope."""
         # A step may lead beyond the narrowest width, where the search with a bound takes over.
         sigma = max(scaled[0], narrowest / start) * start
-        misfit = root * (unit_gaussian(r, sigma) - radial) * start**2
+        misfit = root * (unit_gaussian(r, sigma) - g.radial) * start**2
         slope = root * unit_gaussian_slope(r, sigma) * start**3
         return misfit, slope[:, None]
 

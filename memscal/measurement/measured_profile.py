@@ -396,10 +396,10 @@ def measured_profile(
 
 def _points(scan: Scan, noise: FloatArray, restored: Restoration) -> Mapping[str, MeasuredPoints]:
     normal = measured_points(scan)
-    weight = restored.posterior.estimate.outlier_weight
     if not noise.any():
         # Only the electronic noise scatters: it is that of the restoration.
         noise = np.full_like(noise, restored.noise.min())
+    weight = restored.posterior.estimate.outlier_weight
     points = {"zz": _channel_points(scan, normal, noise[measured_mask(scan)], weight)}
     for channel in TANGENTIAL:
         if f"u_{channel}" in scan.channels:

@@ -212,14 +212,13 @@ def _averaged_shapes(scan: Scan, start: ProfileEstimate) -> _PressureEstimate:
 
 def weighed_shapes(shapes: Sequence[PressureShape], start: ProfileEstimate) -> list[Weighing]:
     """Fit the shapes, and weigh departures from each fit."""
-    model = start.model
     count = float(start.outlier_weight.sum())
     weighed = []
     for shape, fit in zip(shapes, fitted_shapes(shapes, start), strict=True):
         about = departure_basis(fit)
         rings = tuple(replace(ring, amplitude=_SMALLER * ring.amplitude) for ring in about.rings)
         basis = _Basis(fit.conversion_constant, fit.sigma, about.flat, rings, (), None, shape)
-        reduced = ReducedScan.of(model, fit, start.weights)
+        reduced = ReducedScan.of(start.model, fit, start.weights)
         weighed.append(weigh_departures(reduced, basis, count))
     return weighed
 
@@ -408,12 +407,11 @@ def _signals(estimate: ProfileEstimate, state: FloatArray, changes: FloatArray) 
     """Voltages of the pressure through changed references, shape (n, q), in V."""
     kernel = state[: estimate.model.k.size]
     model = estimate.model
-    geometry = estimate.gaussian.geometry
-    wavenumbers = model.reference.wavenumbers
     columns = np.zeros((model.points.u.size, changes.shape[1]))
     for i, change in enumerate(changes.T):
-        changed = replace(model, references=(RadialSpectrum(wavenumbers, change),))
-        columns[:, i] = changed.signal(geometry, kernel)
+        reference = RadialSpectrum(model.reference.wavenumbers, change)
+        changed = replace(model, references=(reference,))
+        columns[:, i] = changed.signal(estimate.gaussian.geometry, kernel)
     return columns
 
 

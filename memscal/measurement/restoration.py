@@ -145,9 +145,10 @@ class Restoration(Result, Checked):
         """Standard uncertainty of the force by source, in N."""
         row = self._at_zero
         n = self.posterior.nodes
-        covariances = self.posterior.covariances
-        variances = {name: float(row @ c[:n, :n] @ row) for name, c in covariances.items()}
-        return {name: float(np.sqrt(max(v, 0.0))) for name, v in variances.items()}
+        budget = {}
+        for name, covariance in self.posterior.covariances.items():
+            budget[name] = float(np.sqrt(max(float(row @ covariance[:n, :n] @ row), 0.0)))
+        return budget
 
     @property
     def centre(self) -> FloatArray:
@@ -269,7 +270,7 @@ class Restoration(Result, Checked):
         rows[0, :nodes] = self._at_zero
         rows[1, :nodes] = self._synthesis(0.0)
         rows[2:, nodes : first_drift + 1] = np.eye(first_drift + 1 - nodes)
-        return np.asarray(rows @ self.posterior.covariance @ rows.T)
+        return rows @ self.posterior.covariance @ rows.T
 
     @property
     def _at_zero(self) -> FloatArray:

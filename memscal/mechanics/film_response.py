@@ -172,9 +172,8 @@ def base_stress(
     film: ElasticFilm, traction: InterfaceTraction, r: FloatArray, *, order: int = 0
 ) -> FloatArray:
     """Return stress, or of ``order`` one traction, at the base (Pa), to 1e-13 of the peak."""
-    h = film.thickness
     flat = np.ravel(r)
-    inside = np.flatnonzero(flat <= traction.radius + _DECAYED * h)
+    inside = np.flatnonzero(flat <= traction.radius + _DECAYED * film.thickness)
     sorting = inside[np.argsort(flat[inside], kind="stable")]
     stress = np.zeros_like(flat)
     for start in range(0, sorting.size, _BASE_STRESS_CHUNK):

@@ -59,8 +59,9 @@ class RoundIndenter(Indenter):
 
     def __post_init__(self) -> None:
         arrays.require_positive(f"{self.shape} radius", self.radius, "m")
-        u = self.radius_uncertainty
-        arrays.require_non_negative(f"uncertainty of the {self.shape} radius", u)
+        arrays.require_non_negative(
+            f"uncertainty of the {self.shape} radius", self.radius_uncertainty
+        )
 
     @property
     def extent(self) -> float:
