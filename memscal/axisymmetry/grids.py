@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from memscal.axisymmetry.hankel import radial_spline
 from memscal.errors import InputError
-from memscal.model.arrays import ArrayFunction, ArrayPair, FloatArray, array_record, value_record
+from memscal.model.arrays import ArrayFunction, FloatArray, array_record, value_record
 
 #: Directions over which a field of a lattice is averaged.
 _DIRECTIONS = 64
@@ -39,7 +39,7 @@ class EvenGrid:
         return self.spacing * np.arange(self.count, dtype=np.float64)
 
     @property
-    def axes(self) -> ArrayPair:
+    def axes(self) -> tuple[FloatArray, FloatArray]:
         """Positions along x and along y of the whole plane, shape (2 count - 1,), in m."""
         whole = np.append(-self.axis[:0:-1], self.axis)
         return whole, whole
@@ -76,7 +76,7 @@ class EvenGrid:
         """Fourier transform about the origin, where an even field's axis already is."""
         return self.forward(field)
 
-    def axis_transfer(self, field: FloatArray) -> ArrayPair:
+    def axis_transfer(self, field: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return wavenumbers along one axis and the Fourier transform about the origin there."""
         line = 2 * field.sum(axis=0) - field[0] - field[-1]
         return self.wavenumber_axis, scipy.fft.dct(line, type=1) * self.cell_area
@@ -99,7 +99,7 @@ class EvenGrid:
         sides = np.append(1.0, np.full(field.shape[0] - 1, 2.0))
         return float(sides @ field @ sides * self.cell_area)
 
-    def radial(self, field: FloatArray) -> ArrayPair:
+    def radial(self, field: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Radii and values along the half axis."""
         return self.axis, field[0]
 
@@ -142,7 +142,7 @@ class Lattice:
             )
 
     @property
-    def axes(self) -> ArrayPair:
+    def axes(self) -> tuple[FloatArray, FloatArray]:
         """Positions along x and along y, in m."""
         return self.x, self.y
 
@@ -162,7 +162,7 @@ class Lattice:
         return np.hypot.outer(*self._wavenumber_axes)
 
     @property
-    def _wavenumber_axes(self) -> ArrayPair:
+    def _wavenumber_axes(self) -> tuple[FloatArray, FloatArray]:
         """Wavenumbers along y and x, in rad/m."""
         dy, dx = self.spacing
         ky = 2 * np.pi * scipy.fft.fftfreq(self.y.size, dy)
@@ -215,7 +215,7 @@ class Lattice:
         """Integral of a field over the lattice."""
         return float(field.sum() * self.cell_area)
 
-    def radial(self, field: FloatArray) -> ArrayPair:
+    def radial(self, field: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Radii along half of x, and the mean over directions there, by cubic splines."""
         from scipy.ndimage import map_coordinates
 

@@ -258,7 +258,6 @@ def _field_shape(solution: Solution, results: Results) -> Iterator[QualityCheck]
 def _set_up(solution: Solution) -> Iterator[QualityCheck]:
     """Film, band, reach, baseline, force and outliers."""
     estimate = solution.estimate
-    points = estimate.points
     film = solution.scan.film
     sigma = estimate.gaussian.sigma
     source = solution.stress.form is not None
@@ -283,10 +282,24 @@ def _set_up(solution: Solution) -> Iterator[QualityCheck]:
     yield check(
         "tail_share",
         solution.tail_share,
-        0.10 if points.order else 0.05,
+        0.10 if estimate.points.order else 0.05,
         "Share of the voltage's integral that lies beyond the scan and is extrapolated. A failure "
         "means that A rests on the extrapolation: scan farther.",
     )
+    yield from _baseline(estimate)
+    if not source:
+        meaning = (
+            "Relative difference of the reference's total force from the load. A failure means "
+            "that the reference was made for another load, or that its table ends too early; A is "
+            "wrong by as much."
+        )
+        force = carried_force(solution.stress, estimate.model.reference)
+        yield check("reference_force", abs(force - 1.0), 0.01, meaning)
+    yield quality.outlier_check(estimate.outlier_weight, "the points that the messages name")
+
+
+def _baseline(estimate: ProfileEstimate) -> Iterator[QualityCheck]:
+    points = estimate.points
     last = 1 + int(points.free[0].sum())
     yield check(
         "baseline_drift",
@@ -309,15 +322,6 @@ def _set_up(solution: Solution) -> Iterator[QualityCheck]:
         found = prior - np.diag(estimate.weighed.covariance)[points.curvatures]
         share = np.abs(estimate.drifts[-count:]) / np.sqrt(np.maximum(found, _LEAST_FOUND * prior))
         yield check("baseline_curvature", share.max(), _CURVED, meaning)
-    if not source:
-        meaning = (
-            "Relative difference of the reference's total force from the load. A failure means "
-            "that the reference was made for another load, or that its table ends too early; A is "
-            "wrong by as much."
-        )
-        force = carried_force(solution.stress, estimate.model.reference)
-        yield check("reference_force", abs(force - 1.0), 0.01, meaning)
-    yield quality.outlier_check(estimate.outlier_weight, "the points that the messages name")
 
 
 def _indentation(

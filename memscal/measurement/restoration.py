@@ -108,7 +108,7 @@ class Restoration(Result, Checked):
         return self.posterior.estimate.points
 
     @property
-    def sigma_zz_errors(self) -> FloatArray:
+    def _sigma_zz_errors(self) -> FloatArray:
         """Standard uncertainty of ``sigma_zz``, in Pa."""
         return np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
 
@@ -250,7 +250,7 @@ class Restoration(Result, Checked):
         return StressProfile(
             r=self.r,
             sigma_zz=self.sigma_zz,
-            sigma_zz_errors=self.sigma_zz_errors,
+            sigma_zz_errors=self._sigma_zz_errors,
             load=self.scan.stated_load,
             film=self.scan.film,
             indenter=self.scan.indenter,
@@ -328,7 +328,7 @@ def _compared(restored: Restoration, stress: StressProfile | Contact) -> StressC
         p_value=float(chdtrc(degrees, chi_square)),
         difference=float(apart.max()) / peak,
         within=float(
-            np.mean(apart <= np.hypot(_EXPANDED * restored.sigma_zz_errors, _NEGLIGIBLE * peak))
+            np.mean(apart <= np.hypot(_EXPANDED * restored._sigma_zz_errors, _NEGLIGIBLE * peak))
         ),
     )
 

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import field, replace
 from functools import cached_property
 from typing import ClassVar
 
@@ -96,7 +96,7 @@ class Contact(Result):
     elastic_energy: float
     work: float | None
     dissipated_energy: float | None
-    interface: Interface = Interface()
+    interface: Interface = field(default_factory=Interface)
     strain: str = "linear"
 
     unit: ClassVar[str] = "Pa"

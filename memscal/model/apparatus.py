@@ -12,7 +12,7 @@ from scipy.special import stdtrit
 from memscal.errors import InputError
 from memscal.model.arrays import FloatArray, FrozenArrays, array_record, keyword_array_record
 from memscal.model.assumptions import Assumption
-from memscal.model.checks import Checked, QualityChecks, state_of_checks
+from memscal.model.checks import Checked, QualityCheck, state_of_checks
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import RoundIndenter
 from memscal.model.instrument import Equipment, LoadCell, StressSensor, User
@@ -230,7 +230,7 @@ class ApparatusData(Checked):
     transfer: TransferFunction
     reconvolution: Reconvolution
     parameters: ParameterSet
-    checks: QualityChecks
+    checks: tuple[QualityCheck, ...]
     film: ElasticFilm | None
     indenter: RoundIndenter | None
     sensor: StressSensor
@@ -241,9 +241,9 @@ class ApparatusData(Checked):
     kernel_changes: Mapping[str, FloatArray] = dataclass_field(default_factory=dict)
     assumptions: tuple[Assumption, ...] = ()
     other: OtherEstimate | None = None
-    load_cell: LoadCell = LoadCell()
-    stage: Equipment = Equipment()
-    user: User = User()
+    load_cell: LoadCell = dataclass_field(default_factory=LoadCell)
+    stage: Equipment = dataclass_field(default_factory=Equipment)
+    user: User = dataclass_field(default_factory=User)
     start_time: str = ""
     end_time: str = ""
 

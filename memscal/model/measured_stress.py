@@ -71,8 +71,8 @@ class MeasuredScan:
     indenter: RoundIndenter
     sensor: StressSensor
     width: float
-    load_cell: LoadCell = LoadCell()
-    stage: Equipment = Equipment()
+    load_cell: LoadCell = field(default_factory=LoadCell)
+    stage: Equipment = field(default_factory=Equipment)
     lubrication: str = ""
     position_scale_uncertainty: float | None = None
     gain_uncertainty: float | None = None

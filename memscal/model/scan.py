@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from memscal.errors import InputError
 from memscal.extensions import hook
 from memscal.model import arrays
-from memscal.model.arrays import ArrayPair, FloatArray, IndexArray, Values, keyword_array_record
+from memscal.model.arrays import FloatArray, IndexArray, Values, keyword_array_record
 from memscal.model.correlation import checked_correlation, of_points
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import RoundIndenter
@@ -251,10 +251,10 @@ class Scan:
     indenter: RoundIndenter | None = None
     film: ElasticFilm | None = None
     unit: str = "V"
-    sensor: StressSensor = StressSensor()
-    load_cell: LoadCell = LoadCell()
-    stage: Equipment = Equipment()
-    user: User = User()
+    sensor: StressSensor = field(default_factory=StressSensor)
+    load_cell: LoadCell = field(default_factory=LoadCell)
+    stage: Equipment = field(default_factory=Equipment)
+    user: User = field(default_factory=User)
     y: FloatArray | None = None
     repeat: NDArray[np.int64] | None = None
     branch: NDArray[np.int64] | None = None
@@ -386,7 +386,7 @@ class Scan:
         return self.y is not None
 
     @property
-    def positions(self) -> ArrayPair:
+    def positions(self) -> tuple[FloatArray, FloatArray]:
         """Position of every voltage along x and y, in m, each like ``u_zz``."""
         along = np.broadcast_to(self.x, self.u_zz.shape)
         if self.y is not None:
