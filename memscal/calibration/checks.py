@@ -12,26 +12,43 @@ from memscal.calibration.fields import RasterFields
 from memscal.calibration.stages import Solution
 from memscal.calibration.uncertainty import DivisionMap, Results, route_difference, slow_noise_text
 from memscal.estimation import model_tests
-from memscal.estimation import residuals as unexplained
 from memscal.estimation.band import RESOLVED
 from memscal.estimation.bayesian import HYPOTHESES, Bayesian
 from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.reference_spectra import carried_force
-from memscal.estimation.residuals import FEWEST_RESIDUALS, TestOutcome
+from memscal.estimation.residuals import (
+    FEWEST_RESIDUALS,
+    TestOutcome,
+    chi_square_test,
+    free_model,
+    neighbour_correlation_test,
+    pure_error_test,
+    residuals_of,
+    ring_test,
+    steps_test,
+)
 from memscal.estimation.runs import compare_runs, hysteresis_test
 from memscal.estimation.slow_noise import slow_noise
 from memscal.mechanics.press_rod import press_rod
-from memscal.model import checks as quality
 from memscal.model.apparatus import ParameterSet
 from memscal.model.arrays import IndexArray
 from memscal.model.assumptions import Assumption
-from memscal.model.checks import QualityCheck, added_check, check, chi_square_limit
+from memscal.model.checks import (
+    FALSE_ALARM,
+    NOISE_LIMIT,
+    QualityCheck,
+    added_check,
+    check,
+    chi_square_limit,
+    noise_check,
+    outlier_check,
+)
 from memscal.model.film import LINEAR
 from memscal.model.notation import format_measured
 
 #: The Bayes factor of a Gaussian sensor has mean one, and exceeds a thousand at most once in a
 #: thousand (Markov's inequality).
-_LOG_BAYES_LIMIT = -float(np.log(quality.FALSE_ALARM))
+_LOG_BAYES_LIMIT = -float(np.log(FALSE_ALARM))
 _EDGE = "an edge: a flat top with steep flanks, as of a disc"
 _KINDS = {
     **dict.fromkeys(("edge", "rough edge", "disc"), _EDGE),
@@ -79,7 +96,7 @@ def quality_checks(
     yield from _set_up(solution)
     yield from _indentation(solution, results, assumed)
     if estimate.points.u_errors is not None:
-        yield quality.noise_check(estimate.weighed.noise, estimate.points.channel)
+        yield noise_check(estimate.weighed.noise, estimate.points.channel)
     yield from _unexplained(estimate, results)
     yield _bayes_factor(estimate)
     yield _symmetry(estimate)
@@ -125,7 +142,7 @@ def _misfit_limit(estimate: ProfileEstimate, degrees: float) -> float:
         return chi_square_limit(degrees) / degrees
     # What the noise was estimated from is a part of the misfit: the rest of it is independent.
     rest = max(degrees - noise.degrees, 1.0)
-    largest = float(fdtri(rest, noise.degrees, 1 - quality.FALSE_ALARM))
+    largest = float(fdtri(rest, noise.degrees, 1 - FALSE_ALARM))
     return (noise.degrees + rest * largest) / degrees
 
 
@@ -141,7 +158,7 @@ def _constraint(solution: Solution) -> Iterator[QualityCheck]:
     free = points.standardised(points.u - estimate.predicted, weights)
     rise = np.sum(kept**2) - np.sum(free**2)
     # As many combinations of departures as the scan determines, and as a constraint may remove.
-    determined = unexplained.free_model(estimate).design.shape[1] - estimate.basis.flat
+    determined = free_model(estimate).design.shape[1] - estimate.basis.flat
     yield check(
         "constraint",
         max(rise, 0.0),
@@ -246,7 +263,7 @@ def _field_shape(solution: Solution, results: Results) -> Iterator[QualityCheck]
     degrees = estimate.raster_noise.degrees if estimate.raster_noise else _WELL_KNOWN
     yield _tested(
         "field_residuals",
-        unexplained.ring_test(left, noise, fields.index, degrees),
+        ring_test(left, noise, fields.index, degrees),
         "Power of the Bayesian fit's residuals over the plane in one ring of wavenumbers, over "
         "that of the noise: the ring where chance makes it least likely. A failure means that the "
         "form of G leaves a structure of the scan, and that the baseline, with it A, is drawn "
@@ -295,7 +312,7 @@ def _set_up(solution: Solution) -> Iterator[QualityCheck]:
         )
         force = carried_force(solution.stress, estimate.model.reference)
         yield check("reference_force", abs(force - 1.0), 0.01, meaning)
-    yield quality.outlier_check(estimate.outlier_weight, "the points that the messages name")
+    yield outlier_check(estimate.outlier_weight, "the points that the messages name")
 
 
 def _baseline(estimate: ProfileEstimate) -> Iterator[QualityCheck]:
@@ -354,17 +371,17 @@ def _indentation(
 
 def _unexplained(estimate: ProfileEstimate, results: Results) -> Iterator[QualityCheck]:
     """Test what no G explains: its size against the noise, and its order along the scan."""
-    model = unexplained.free_model(estimate)
-    residuals = unexplained.residuals_of(estimate, model)
+    model = free_model(estimate)
+    residuals = residuals_of(estimate, model)
     if residuals.degrees < FEWEST_RESIDUALS:
         return
     outcome: TestOutcome | None
     if residuals.stated:
-        outcome = unexplained.chi_square_test(residuals)
+        outcome = chi_square_test(residuals)
         compared = f"with the stated noise: reduced chi-square of {residuals.degrees} degrees"
         noise = "the noise is larger than stated, or "
     else:
-        outcome = unexplained.pure_error_test(estimate, model)
+        outcome = pure_error_test(estimate, model)
         compared = "with the scatter of repeats, as no noise is stated: an F ratio"
         noise = ""
     if outcome is not None:
@@ -386,13 +403,13 @@ def _unexplained(estimate: ProfileEstimate, results: Results) -> Iterator[Qualit
     found = f" {slow_noise_text(estimate, slow, results)}" if slow else ""
     yield _tested(
         "residual_steps",
-        unexplained.steps_test(residuals),
+        steps_test(residuals),
         "Largest step of the residuals along the scan, in standard deviations. A failure means "
         f"that readings changed from one point on by what no radial G explains: {cause}",
     )
     yield _tested(
         "residual_correlation",
-        unexplained.neighbour_correlation_test(residuals),
+        neighbour_correlation_test(residuals),
         "Correlation of each residual with its neighbours along the scan, halved for each step "
         f"farther, over what chance gives on average. A failure means that residuals are "
         f"alike: {cause}{found}",
@@ -527,7 +544,7 @@ def _runs(estimate: ProfileEstimate) -> Iterator[QualityCheck]:
     yield check(
         "noise_agreement",
         runs.noise.value**0.5,
-        max(quality.NOISE_LIMIT, runs.noise.limit**0.5),
+        max(NOISE_LIMIT, runs.noise.limit**0.5),
         f"Ratio of the scatter of one repeat of a scan to that of all others{stated}, or back: "
         f"number {runs.noisy + 1} of {runs.count} has {'more' if runs.louder else 'less'}. A "
         "failure means that their noise differs beyond chance, so that weights and uncertainties "

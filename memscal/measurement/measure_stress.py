@@ -14,9 +14,18 @@ from memscal.formats.opened import Scans, opened_scans, require_different
 from memscal.measurement import measured_profile as one_load
 from memscal.measurement import restore
 from memscal.measurement.restoration import Restoration
-from memscal.model import checks as quality
 from memscal.model.arrays import FloatArray
-from memscal.model.checks import Message, QualityCheck, QualityChecks, check
+from memscal.model.checks import (
+    FAILED_CALIBRATION,
+    FAILED_CHECK,
+    NOISE_UNSTATED,
+    Message,
+    QualityCheck,
+    QualityChecks,
+    check,
+    failed_check_messages,
+    override_messages,
+)
 from memscal.model.measured_stress import MeasuredProfile, MeasuredScan, MeasuredStress
 from memscal.model.provenance import Process, accepted_alterations
 from memscal.model.scan import STATED_ERRORS, Scan
@@ -108,7 +117,7 @@ def check_of_all_forces(profiles: Sequence[MeasuredProfile]) -> QualityCheck:
 
 
 #: Messages of a restoration that the measured stress gives itself.
-_GIVEN_ONCE = (quality.FAILED_CHECK, quality.FAILED_CALIBRATION, quality.NOISE_UNSTATED)
+_GIVEN_ONCE = (FAILED_CHECK, FAILED_CALIBRATION, NOISE_UNSTATED)
 
 
 @reported
@@ -230,7 +239,7 @@ def joined_stress(stresses: Sequence[MeasuredStress]) -> MeasuredStress:
     for stress in stresses:
         names = ", ".join(scan.source.file_name for scan in stress.scans if scan.source)
         place = names or f"{stress.profiles[0].label} and on"
-        others = [message for message in stress.messages if message.kind != quality.FAILED_CHECK]
+        others = [message for message in stress.messages if message.kind != FAILED_CHECK]
         messages += [replace(message, text=f"{place}: {message.text}") for message in others]
     return replace(
         first,
@@ -293,8 +302,8 @@ def _messages(
     checks: Sequence[QualityCheck],
     overridden: Sequence[str],
 ) -> Iterator[Message]:
-    yield from quality.failed_check_messages(checks)
-    yield from quality.override_messages(overridden)
+    yield from failed_check_messages(checks)
+    yield from override_messages(overridden)
     yield from restore.failed_calibration_messages(sensor)
     # A message that several profiles have in common is given once.
     numbers: dict[Message, list[str]] = {}

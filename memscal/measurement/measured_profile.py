@@ -458,7 +458,7 @@ def _on_axis(restored: Restoration) -> tuple[float, Mapping[str, float]]:
     """Return the blurred stress on the axis and its standard uncertainty by source, in Pa."""
     posterior = restored.posterior
     apparatus = restored.apparatus
-    wavenumbers = posterior.estimate.model.reference.wavenumbers
+    wavenumbers = posterior.wavenumbers
     nodes = posterior.nodes
     k = wavenumbers.k
     on_axis = wavenumbers.synthesise(np.eye(nodes), np.zeros(1))[0]

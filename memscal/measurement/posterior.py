@@ -326,6 +326,11 @@ class Posterior:
         return np.asarray(np.sum(list(self.covariances.values()), axis=0))
 
     @property
+    def wavenumbers(self) -> Wavenumbers:
+        """Nodes of the transform of the base stress."""
+        return self.estimate.model.reference.wavenumbers
+
+    @property
     def stress(self) -> FloatArray:
         """Transform of the base stress at the nodes, in N."""
         return self.state[: self.nodes]

@@ -15,9 +15,15 @@ from memscal.estimation.points import ScanPoints
 from memscal.formats.reference import read_reference
 from memscal.measurement.posterior import Posterior, film_transfer, reach_of, sensor_changes
 from memscal.mechanics.contact import Contact
-from memscal.model import checks as quality
 from memscal.model.arrays import FloatArray, array_record
-from memscal.model.checks import Checked, Messages, QualityChecks
+from memscal.model.checks import (
+    OVERRIDE,
+    Checked,
+    Messages,
+    QualityChecks,
+    chi_square_limit,
+    state_of_checks,
+)
 from memscal.model.indenter import Rod
 from memscal.model.notation import format_measured
 from memscal.model.result import Result
@@ -99,7 +105,7 @@ class Restoration(Result, Checked):
     def __repr__(self) -> str:
         """Return the main numbers in place of thousands of array elements."""
         force = format_measured(self.force, self.force_uncertainty, "N")
-        state = quality.state_of_checks(self.checks)
+        state = state_of_checks(self.checks)
         return f"<Restoration: force {force}, {self.r.size} radii, {state}>"
 
     @property
@@ -246,7 +252,7 @@ class Restoration(Result, Checked):
 
     def profile(self) -> StressProfile:
         """Return the restored stress as a table with its uncertainty, as a file holds it."""
-        overridden = (message.text for message in self.messages if message.kind == quality.OVERRIDE)
+        overridden = (message.text for message in self.messages if message.kind == OVERRIDE)
         return StressProfile(
             r=self.r,
             sigma_zz=self.sigma_zz,
@@ -275,7 +281,7 @@ class Restoration(Result, Checked):
     @property
     def _at_zero(self) -> FloatArray:
         """Row that reads a transform at k = 0: by a parabola in k^2, as :class:`RadialSpectrum`."""
-        wavenumbers = self.posterior.estimate.model.reference.wavenumbers
+        wavenumbers = self.posterior.wavenumbers
         row = np.zeros(wavenumbers.k.size)
         row[:3] = [RadialSpectrum(wavenumbers, unit).integral for unit in np.eye(3, row.size)]
         return row
@@ -295,7 +301,7 @@ class Restoration(Result, Checked):
                 why=f"The stress was restored out to {reach * 1e3:.4g} mm.",
                 cure="Give radii in metres, within 1.5 times the scan's width.",
             )
-        wavenumbers = self.posterior.estimate.model.reference.wavenumbers
+        wavenumbers = self.posterior.wavenumbers
         return wavenumbers.synthesise(np.eye(wavenumbers.k.size), radii)
 
 
@@ -310,7 +316,7 @@ def _compared(restored: Restoration, stress: StressProfile | Contact) -> StressC
             "proportional to it.",
             cure="Calculate the stress for the scan's load.",
         )
-    wavenumbers = restored.posterior.estimate.model.reference.wavenumbers
+    wavenumbers = restored.posterior.wavenumbers
     if isinstance(stress, Contact):
         spectrum = stress.base_spectrum(wavenumbers.k) / stress.load
     else:
@@ -324,7 +330,7 @@ def _compared(restored: Restoration, stress: StressProfile | Contact) -> StressC
         sigma_zz=calculated,
         chi_square=chi_square / degrees,
         degrees=degrees,
-        limit=quality.chi_square_limit(degrees) / degrees,
+        limit=chi_square_limit(degrees) / degrees,
         p_value=float(chdtrc(degrees, chi_square)),
         difference=float(apart.max()) / peak,
         within=float(

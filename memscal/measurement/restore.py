@@ -11,18 +11,37 @@ import numpy as np
 from memscal.apparatus import ApparatusFunction, opened_apparatus
 from memscal.axisymmetry.hankel import RadialSpectrum, Wavenumbers
 from memscal.errors import FitError, InputError
-from memscal.estimation import points as scan_points
-from memscal.estimation import profile
 from memscal.estimation.model_tests import axisymmetry_test, symmetry_test
+from memscal.estimation.points import ScanPoints, measured_points
+from memscal.estimation.profile import (
+    CentreError,
+    ProfileEstimate,
+    estimate_profile,
+    point_messages,
+)
 from memscal.estimation.residuals import FEWEST_RESIDUALS, chi_square_test, residuals_of
 from memscal.estimation.set_up import accepted_differences, file_in_words, stated_differences
 from memscal.formats.opened import opened_scan
 from memscal.formats.reference import read_reference
 from memscal.measurement.posterior import film_transfer, posterior_of, reach_of, sensor_changes
 from memscal.measurement.restoration import SAME_LOAD, Expected, Restoration, StressComparison
-from memscal.model import checks as quality
 from memscal.model.arrays import FloatArray
-from memscal.model.checks import Message, Messages, QualityCheck, check, chi_square_limit
+from memscal.model.checks import (
+    FAILED_CALIBRATION,
+    NOISE_UNSTATED,
+    Message,
+    Messages,
+    QualityCheck,
+    added_check,
+    check,
+    chi_square_limit,
+    failed_check_messages,
+    noise_check,
+    outlier_check,
+    override_messages,
+    state_of_checks,
+    uncertainty_unstated_messages,
+)
 from memscal.model.indenter import Rod
 from memscal.model.measured_stress import MeasuredScan
 from memscal.model.provenance import accepted_alterations
@@ -230,7 +249,7 @@ def _checks(restored: Restoration) -> Iterator[QualityCheck]:
     )
     yield from _noise(restored)
     yield _symmetry(restored)
-    yield quality.outlier_check(restored.posterior.estimate.outlier_weight, "the residuals")
+    yield outlier_check(restored.posterior.estimate.outlier_weight, "the residuals")
     if restored.comparison is not None:
         yield _expected(restored.comparison)
 
@@ -248,7 +267,7 @@ def force_less_load(
 def _noise(restored: Restoration) -> Iterator[QualityCheck]:
     if restored.points.u_errors is None:
         return
-    yield quality.noise_check(restored.posterior.found_noise)
+    yield noise_check(restored.posterior.found_noise)
     residuals = residuals_of(restored.posterior.estimate)
     if residuals.degrees >= FEWEST_RESIDUALS:
         size = chi_square_test(residuals)
@@ -277,7 +296,7 @@ def _symmetry(restored: Restoration) -> QualityCheck:
             "odd columns. A failure means that the left and right halves differ: a tilted "
             "indenter, an uneven film, or a drifting load."
         )
-    return quality.added_check(
+    return added_check(
         name, uneven.fall, uneven.count, f"Fall of chi-square by {uneven.count} {meaning}"
     )
 
@@ -299,9 +318,9 @@ def _expected(compared: StressComparison) -> QualityCheck:
 def restoration_messages(restored: Restoration, checks: Sequence[QualityCheck]) -> Messages:
     """Return the messages that accompany a result, warnings first."""
     points = restored.points
-    messages = quality.failed_check_messages(checks)
+    messages = failed_check_messages(checks)
     messages += failed_calibration_messages(restored.apparatus)
-    messages += profile.point_messages(restored.posterior.estimate)
+    messages += point_messages(restored.posterior.estimate)
     if points.u_errors is None:
         messages.append(noise_unstated_message(points.reading.text(restored.noise.min())))
     if not restored.apparatus.radial_profile.g_errors.any():
@@ -317,19 +336,19 @@ def restoration_messages(restored: Restoration, checks: Sequence[QualityCheck]) 
         "Poisson's ratio": film.poisson_ratio_uncertainty,
         "load": restored.scan.load_uncertainty,
     }
-    return tuple(messages + quality.uncertainty_unstated_messages(unstated))
+    return tuple(messages + uncertainty_unstated_messages(unstated))
 
 
 def failed_calibration_messages(apparatus: ApparatusFunction) -> list[Message]:
     """Return one message if a check of the calibration had failed, else none."""
-    text = f"Quality checks of the calibration itself {quality.state_of_checks(apparatus.checks)}."
-    return [] if apparatus.passed else [Message(quality.FAILED_CALIBRATION, text)]
+    text = f"Quality checks of the calibration itself {state_of_checks(apparatus.checks)}."
+    return [] if apparatus.passed else [Message(FAILED_CALIBRATION, text)]
 
 
 def noise_unstated_message(noise: str) -> Message:
     """Return the message for a scan without u_zz_errors, with the estimated noise in its unit."""
     return Message(
-        quality.NOISE_UNSTATED,
+        NOISE_UNSTATED,
         f"u_zz_errors is absent: a noise of {noise} was estimated from the scatter.",
     )
 
@@ -396,7 +415,7 @@ def restore(
     overridden = accepted_alterations(*sources)
     overridden += accept_mismatches(measured, sensor, override=override)
     restored = restore_known(measured, sensor, expected)
-    messages = quality.override_messages(overridden)
+    messages = override_messages(overridden)
     return replace(restored, messages=(*messages, *restored.messages))
 
 
@@ -404,18 +423,17 @@ def restore_known(
     scan: Scan,
     apparatus: ApparatusFunction,
     expected: Expected = None,
-    start: profile.ProfileEstimate | None = None,
+    start: ProfileEstimate | None = None,
 ) -> Restoration:
     """Restore a stress from a scan and an apparatus function that were checked to fit together."""
     # ``start``: the pressure of nearly the same voltages.
-    points = scan_points.measured_points(scan)
+    points = measured_points(scan)
     estimate, transfer = gaussian_pressure(scan, apparatus, points, start)
-    wavenumbers = estimate.model.reference.wavenumbers
     posterior = posterior_of(scan, apparatus, estimate, transfer)
     nodes = posterior.nodes
     # From the axis to half the scan's width.
     r = np.linspace(0.0, reach_of(points) / 3, 161)
-    matrix = wavenumbers.synthesise(np.eye(nodes), r)
+    matrix = posterior.wavenumbers.synthesise(np.eye(nodes), r)
     restored = Restoration(
         scan=scan,
         apparatus=apparatus,
@@ -433,17 +451,17 @@ def restore_known(
 def gaussian_pressure(
     scan: Scan,
     apparatus: ApparatusFunction,
-    points: scan_points.ScanPoints,
-    start: profile.ProfileEstimate | None = None,
-) -> tuple[profile.ProfileEstimate, FloatArray]:
+    points: ScanPoints,
+    start: ProfileEstimate | None = None,
+) -> tuple[ProfileEstimate, FloatArray]:
     """Return the best Gaussian pressure on the film, with departures, and A G's transform."""
     through, transfer = unit_force(scan, apparatus, points)
     with undetermined():
-        return profile.estimate_profile(points, through, start=start), transfer
+        return estimate_profile(points, through, start=start), transfer
 
 
 def unit_force(
-    scan: Scan, apparatus: ApparatusFunction, points: scan_points.ScanPoints
+    scan: Scan, apparatus: ApparatusFunction, points: ScanPoints
 ) -> tuple[RadialSpectrum, FloatArray]:
     """Transform of a unit force's voltages, in V m^2 / N, and that of A G, in V/Pa."""
     # A film passes nothing of exp(-kh) beyond kh = 20: 2e-9 of the load.
@@ -459,7 +477,7 @@ def undetermined() -> Iterator[None]:
     """Say of a pressure that no Gaussian fits what this means."""
     try:
         yield
-    except profile.CentreError:
+    except CentreError:
         raise
     except FitError as failure:
         raise FitError(

@@ -47,7 +47,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from memscal.axisymmetry.hankel import bessel, gauss_between, gauss_panels
-from memscal.mechanics import surface
+from memscal.mechanics.surface import (
+    SurfaceCompliance,
+    coupling_integrals,
+    on_hats,
+    singular_integrals,
+)
 from memscal.model.arrays import ArrayPair, FloatArray, array_record, floats
 from memscal.model.film import ElasticFilm
 
@@ -219,8 +224,8 @@ class RingTraction:
         """Return the four integrals of :class:`InterfaceTraction` at ``r`` (m), in Pa m."""
         p = self.pressures
         q = self.shears
-        singular = surface.singular_integrals(r, self.rings)
-        beyond, within = surface.coupling_integrals(r, self.rings)
+        singular = singular_integrals(r, self.rings)
+        beyond, within = coupling_integrals(r, self.rings)
         return singular[0] @ p, beyond @ q, within @ p, singular[1] @ q
 
     def _transform(self, values: FloatArray, k: FloatArray, order: int) -> FloatArray:
@@ -252,7 +257,7 @@ def hat_transform(ring_bytes: bytes, k_bytes: bytes, order: int) -> FloatArray:
     waves = bessel(order, np.multiply.outer(k, s)) * (weights * s)
     starts = np.arange(0, s.size, count)
     right = np.add.reduceat(waves * rising, starts, axis=1)
-    return surface.on_hats(np.add.reduceat(waves, starts, axis=1) - right, right)
+    return on_hats(np.add.reduceat(waves, starts, axis=1) - right, right)
 
 
 @array_record
@@ -263,17 +268,17 @@ class HankelFilm:
     r: FloatArray
 
     @cached_property
-    def compliance(self) -> surface.SurfaceCompliance:
+    def compliance(self) -> SurfaceCompliance:
         """Displacements of the rings under tractions on the rings."""
         film = self.film
         r = self.r
-        direct = surface.singular_integrals(r, r)
-        across = surface.coupling_integrals(r, r)
+        direct = singular_integrals(r, r)
+        across = coupling_integrals(r, r)
         k, weights = _wavenumbers(film, 2 * r[-1])
         normal, radial = (hat_transform(r.tobytes(), k.tobytes(), order) for order in (0, 1))
         half_space = (direct[0], *across, direct[1])
         matrices = _displacements(film, r, (k, weights), (normal, radial), half_space)
-        return surface.SurfaceCompliance(r, *matrices)
+        return SurfaceCompliance(r, *matrices)
 
     discretisation = "Hankel transforms, Gauss-Legendre in k"
 

@@ -8,8 +8,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from memscal.errors import InputError
-from memscal.model import arrays
-from memscal.model.arrays import FloatArray, floats, keyword_array_record, keyword_value_record
+from memscal.model.arrays import (
+    FloatArray,
+    finite_vector,
+    floats,
+    keyword_array_record,
+    keyword_value_record,
+    require_increasing,
+    require_non_negative,
+    require_positive,
+)
 
 
 class Indenter:
@@ -58,10 +66,8 @@ class RoundIndenter(Indenter):
     radius_uncertainty: float | None = None
 
     def __post_init__(self) -> None:
-        arrays.require_positive(f"{self.shape} radius", self.radius, "m")
-        arrays.require_non_negative(
-            f"uncertainty of the {self.shape} radius", self.radius_uncertainty
-        )
+        require_positive(f"{self.shape} radius", self.radius, "m")
+        require_non_negative(f"uncertainty of the {self.shape} radius", self.radius_uncertainty)
 
     @property
     def extent(self) -> float:
@@ -170,11 +176,11 @@ class Profile(Indenter):
     z: FloatArray
 
     def __post_init__(self) -> None:
-        r = arrays.finite_vector("r of the indenter's profile", self.r)
-        z = arrays.finite_vector("height of the indenter's profile", self.z)
+        r = finite_vector("r of the indenter's profile", self.r)
+        z = finite_vector("height of the indenter's profile", self.z)
         object.__setattr__(self, "r", r)
         object.__setattr__(self, "z", z)
-        arrays.require_increasing("r of the indenter's profile", self.r)
+        require_increasing("r of the indenter's profile", self.r)
         if self.r.size != self.z.size or self.r.size < 4 or self.r[0] != 0:
             raise InputError(
                 f"The indenter's profile has {self.r.size} radii from {self.r[0] * 1e3:g} mm and "
@@ -196,7 +202,7 @@ class Profile(Indenter):
         cls, height: Callable[[FloatArray], ArrayLike], *, extent: float, points: int = 2001
     ) -> "Profile":
         """Return the profile of a function: ``points`` even radii up to ``extent``, all in m."""
-        arrays.require_positive("extent of the indenter's profile", extent, "m")
+        require_positive("extent of the indenter's profile", extent, "m")
         r = np.linspace(0.0, extent, points)
         return cls(r=r, z=np.broadcast_to(height(r), r.shape))
 

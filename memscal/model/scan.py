@@ -14,8 +14,19 @@ from numpy.typing import ArrayLike, NDArray
 
 from memscal.errors import InputError
 from memscal.extensions import hook
-from memscal.model import arrays
-from memscal.model.arrays import FloatArray, IndexArray, Values, keyword_array_record
+from memscal.model.arrays import (
+    FloatArray,
+    IndexArray,
+    Values,
+    finite_vector,
+    frozen_array,
+    keyword_array_record,
+    require_non_negative,
+    require_size,
+    unmasked,
+    warn_of_units,
+    whole_numbers,
+)
 from memscal.model.correlation import checked_correlation, of_points
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import RoundIndenter
@@ -82,7 +93,7 @@ def require_rod_friction(friction: float | None) -> None:
 
 def branch_numbers(name: str, stated: ArrayLike) -> NDArray[np.int64]:
     """Return branches, given by number or by word, as an array of numbers."""
-    values = np.asarray(arrays.unmasked(stated))
+    values = np.asarray(unmasked(stated))
     numbers = values
     named = {"": 0, **BRANCHES}
     if values.dtype.kind not in "biuf":
@@ -291,13 +302,13 @@ class Scan:
 
     def __post_init__(self) -> None:
         self._freeze_positions()
-        object.__setattr__(self, "u_zz", arrays.frozen_array(self.u_zz))
+        object.__setattr__(self, "u_zz", frozen_array(self.u_zz))
         self._check_signal_shape()
         self._freeze_readings()
         self._check_values()
         self._check_set_up()
         require_contacts(self)
-        arrays.warn_of_units(self.film, self.indenter)
+        warn_of_units(self.film, self.indenter)
         if self.u_zz_correlation is not None:
             points = self.u_zz.size if self.planar else self.x.size
             correlation = checked_correlation(self.u_zz_correlation, points)
@@ -415,16 +426,14 @@ class Scan:
         for name in ("x", "y"):
             stated = getattr(self, name)
             if stated is not None:
-                values = arrays.finite_vector(f"{name} of the scan", stated)
-                arrays.require_size(
-                    f"{name} of the scan (/entry/data/{name})", values, "m", smallest=0.0
-                )
+                values = finite_vector(f"{name} of the scan", stated)
+                require_size(f"{name} of the scan (/entry/data/{name})", values, "m", smallest=0.0)
                 object.__setattr__(self, name, values)
         if self.repeat is not None:
-            repeat = arrays.whole_numbers("repeat of the scan", self.repeat)
+            repeat = whole_numbers("repeat of the scan", self.repeat)
             object.__setattr__(self, "repeat", repeat)
         if self.x_errors is not None:
-            errors = arrays.finite_vector("x_errors of the scan", self.x_errors)
+            errors = finite_vector("x_errors of the scan", self.x_errors)
             if errors.shape != self.x.shape or np.any(errors < 0):
                 raise InputError(
                     f"x_errors holds {errors.size} values for {self.x.size} positions, the "
@@ -455,7 +464,7 @@ class Scan:
             require_plane(self.x, self.y)
 
     def _freeze_readings(self) -> None:
-        arrays.require_size("u_zz of the scan", self.u_zz)
+        require_size("u_zz of the scan", self.u_zz)
         channels = {name: self._like_signal(name, u) for name, u in self.channels.items()}
         object.__setattr__(self, "channels", MappingProxyType(channels))
         for name in LIKE_SIGNAL:
@@ -469,10 +478,10 @@ class Scan:
             object.__setattr__(self, "branch", self._like_signal("branch", branch, np.int64))
 
     def _like_signal(self, name: str, values: ArrayLike, dtype: Any = np.float64) -> FloatArray:
-        array = arrays.frozen_array(values, dtype=dtype)
+        array = frozen_array(values, dtype=dtype)
         if array.shape != self.u_zz.shape:
             raise InputError(f"{name} has shape {array.shape}, but u_zz has {self.u_zz.shape}.")
-        arrays.require_size(f"{name} of the scan", array)
+        require_size(f"{name} of the scan", array)
         return array
 
     def _check_values(self) -> None:
@@ -509,12 +518,12 @@ class Scan:
                 cure="A line scan runs along 'x' or 'y'; a raster has its own y.",
             )
         for name in STATED_ERRORS:
-            arrays.require_non_negative(
+            require_non_negative(
                 f"{name.replace('_', ' ')} uncertainty of the scan",
                 getattr(self, f"{name}_uncertainty"),
             )
         require_rod_friction(self.rod_friction)
-        arrays.require_non_negative("standard uncertainty of the load", self.load_uncertainty)
+        require_non_negative("standard uncertainty of the load", self.load_uncertainty)
         if self.load is None:
             return
         if not 0 < self.load < math.inf:

@@ -8,8 +8,18 @@ import numpy as np
 from scipy.special import j0, j1
 
 from memscal.errors import InputError
-from memscal.model import arrays
-from memscal.model.arrays import ArrayPair, FloatArray, floats, keyword_array_record, value_record
+from memscal.model.arrays import (
+    TINY,
+    ArrayPair,
+    FloatArray,
+    finite_vector,
+    floats,
+    keyword_array_record,
+    require_increasing,
+    require_positive,
+    table_spline,
+    value_record,
+)
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Indenter
 from memscal.model.provenance import SourceFile
@@ -65,7 +75,7 @@ class IdealReference:
                 cure=f"Give one of {', '.join(IDEAL)}.",
             )
         if self.shape != "point":
-            arrays.require_positive(f"{IDEAL[self.shape]} of the {self.shape}", self.size, "m")
+            require_positive(f"{IDEAL[self.shape]} of the {self.shape}", self.size, "m")
         elif self.size:
             raise InputError(
                 f"A point has no size, but {self.size:g} m is given.",
@@ -158,9 +168,9 @@ class StressField:
 
     def __post_init__(self) -> None:
         for name in ("x", "y"):
-            axis = arrays.finite_vector(f"{name} of the field", getattr(self, name))
+            axis = finite_vector(f"{name} of the field", getattr(self, name))
             object.__setattr__(self, name, axis)
-            arrays.require_increasing(f"{name} of the field", axis)
+            require_increasing(f"{name} of the field", axis)
             steps = np.diff(axis)
             if not _FEWEST <= axis.size <= MOST_PIXELS or np.ptp(steps) > _EVEN * steps.mean():
                 problem = f"{name} of the field has {axis.size} values, or uneven ones"
@@ -172,10 +182,10 @@ class StressField:
         expected = (self.y.size, self.x.size)
         if shape != expected:
             raise InputError(f"The field has shape {shape}, but y and x make it {expected}.")
-        values = arrays.finite_vector("The field", np.ravel(self.values)).reshape(expected)
+        values = finite_vector("The field", np.ravel(self.values)).reshape(expected)
         object.__setattr__(self, "values", values)
         border = np.concatenate([values[0], values[-1], values[:, 0], values[:, -1]])
-        left = np.abs(border).mean() / max(np.abs(values).max(), arrays.TINY)
+        left = np.abs(border).mean() / max(np.abs(values).max(), TINY)
         if left > _BORDER or not values.sum() > _LEAST * np.abs(values).sum():
             raise InputError(
                 f"The field adds up to {values.sum():.3g}, with {left:.1%} of its largest value "
@@ -184,7 +194,7 @@ class StressField:
                 cure="Change its sign, subtract the background, or give a larger field.",
             )
         if self.load is not None:
-            arrays.require_positive("load of the field", self.load, "N")
+            require_positive("load of the field", self.load, "N")
 
     def __str__(self) -> str:
         """Return it in words."""
@@ -309,16 +319,16 @@ class StressProfile:
     field: StressField | None = None
 
     def __post_init__(self) -> None:
-        arrays.require_positive("load of the stress profile", self.load, "N")
+        require_positive("load of the stress profile", self.load, "N")
         for name in ("r", "sigma_zz", "sigma_rz", "sigma_zz_errors"):
             stated = getattr(self, name)
             if stated is not None:
-                values = arrays.finite_vector(f"{name} of the stress profile", stated)
+                values = finite_vector(f"{name} of the stress profile", stated)
                 object.__setattr__(self, name, values)
                 if values.size != self.r.size:
                     count = f"{values.size} values for {self.r.size} radii"
                     raise InputError(f"{name} of the stress profile has {count}.")
-        arrays.require_increasing("r of the stress profile", self.r)
+        require_increasing("r of the stress profile", self.r)
         if self.r[0] < 0:
             raise InputError(
                 "r of the stress profile is negative.", cure="Give radii, not positions."
@@ -357,5 +367,5 @@ class StressProfile:
         inner = slice(1, 4) if self.r[0] == 0 else slice(0, 3)
         density = self.sigma_zz * self.r
         radii, values = (np.append(-v[inner][::-1], v) for v in (self.r, density))
-        spline, _ = arrays.table_spline(radii, values)
+        spline, _ = table_spline(radii, values)
         return float(2 * np.pi * spline.integrate(0.0, self.r[-1]))
