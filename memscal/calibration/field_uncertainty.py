@@ -37,6 +37,7 @@ from memscal.model.arrays import (
     FloatArray,
     IndexArray,
     array_record,
+    slices,
 )
 from memscal.progress import Task
 
@@ -231,7 +232,7 @@ def _by_parameters(
         return passed
 
     task = Task("kernels", count)
-    for some in task.counted(_chunks(count), lambda some: some.stop - some.start):
+    for some in task.counted(slices(count, _COLUMNS), lambda some: some.stop - some.start):
         unit = np.eye(count)[:, some]
         voltages = estimate.basis.voltages(estimate.model, estimate.gaussian, unit)
         moved[:, some] = compare(kernels(unit), some) - division.divided(voltages)
@@ -280,11 +281,11 @@ def _division_variances(
     variance = own[np.ix_(rows[stated[0]], columns[stated[1]])].ravel()
     for left, right in gain.parts:
         by_points: Any = np.eye(share.size) if right is None else right
-        for some in _chunks(by_points.shape[1]):
+        for some in slices(by_points.shape[1], _COLUMNS):
             readings = division.divided(noise[:, None] * by_points[:, some])
             variance += 2 * np.sum((moved @ left[:, some]) * readings, axis=1)
     fitted = square_root(gain.covariance(np.sqrt(noise)))
-    for some in _chunks(count):
+    for some in slices(count, _COLUMNS):
         variance += np.sum((moved @ fitted[:, some]) ** 2, axis=1)
     # A is the sum of A G over the nodes.
     back = irfft2(np.conj(ratio) * rfft2(ifftshift(fields.confinement)), s=shape)
@@ -301,13 +302,8 @@ def _division_variances(
     root = np.eye(count + 1)
     root[:-1, :-1] = square_root(estimate.weighed.covariance)
     sums = grid.cell_area * division.every * (sums @ root)
-    for some in _chunks(count + 1):
+    for some in slices(count + 1, _COLUMNS):
         rest += np.sum((hidden @ root[:, some] - np.outer(g, sums[some])) ** 2, axis=1)
     variances = np.zeros((2, x.size * y.size))
     variances[:, inside] = np.stack([variance, rest]) / deconvolution.conversion_constant**2
     return variances
-
-
-def _chunks(count: int) -> list[slice]:
-    """Some columns at a time."""
-    return [slice(start, min(start + _COLUMNS, count)) for start in range(0, count, _COLUMNS)]

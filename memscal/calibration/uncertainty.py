@@ -43,7 +43,7 @@ from memscal.estimation.smoothing import SmoothedProfile
 from memscal.estimation.voltage_map import DENSE, VoltageMap, square_root, triangular
 from memscal.mechanics.contact import Contact
 from memscal.model.apparatus import ParameterSet
-from memscal.model.arrays import TINY, FloatArray, array_record
+from memscal.model.arrays import TINY, FloatArray, array_record, slices
 from memscal.model.assumptions import MOVED
 from memscal.model.scan import STATED_ERRORS, Scan
 from memscal.model.stress import StressProfile
@@ -597,8 +597,8 @@ def _division_map(
     nuisance = np.hstack([model.centre_derivative(geometry, estimate.kernel), model.drift_columns])
     kernels = np.column_stack([estimate.kernel, basis.kernels(model.k)])
     count = kernels.shape[1] if estimate.points.u.size <= DENSE else _COLUMNS
-    starts = range(0, kernels.shape[1], count)
-    signals = (model.signal(geometry, kernels[:, i : i + count]) for i in starts)
+    chunks = slices(kernels.shape[1], count)
+    signals = (model.signal(geometry, kernels[:, chunk]) for chunk in chunks)
     kept = np.hstack([direct @ voltages for voltages in signals])
     radial = np.column_stack([estimate.radial(r), basis.radial(r)])
     places = slice(2, 2 + nuisance.shape[1])

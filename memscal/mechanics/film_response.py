@@ -53,7 +53,7 @@ from memscal.mechanics.surface import (
     on_hats,
     singular_integrals,
 )
-from memscal.model.arrays import ArrayPair, FloatArray, array_record, floats
+from memscal.model.arrays import ArrayPair, FloatArray, array_record, floats, slices
 from memscal.model.film import ElasticFilm
 
 # exp(-2 * 340) is still a normal number; beyond, every response has long reached its limit.
@@ -181,8 +181,8 @@ def base_stress(
     inside = np.flatnonzero(flat <= traction.radius + _DECAYED * film.thickness)
     sorting = inside[np.argsort(flat[inside], kind="stable")]
     stress = np.zeros_like(flat)
-    for start in range(0, sorting.size, _BASE_STRESS_CHUNK):
-        chunk = sorting[start : start + _BASE_STRESS_CHUNK]
+    for some in slices(sorting.size, _BASE_STRESS_CHUNK):
+        chunk = sorting[some]
         # The integrand turns at the rate r (Bessel function) + radius (transform of the traction).
         k, weights = _wavenumbers(film, flat[chunk[-1]] + traction.radius)
         density = weights * k * base_spectrum(film, traction, k, order=order)
@@ -232,8 +232,7 @@ class RingTraction:
         flat = np.ravel(floats(k))
         transform = np.zeros_like(flat)
         if np.any(values):
-            for start in range(0, flat.size, _CHUNK):
-                chunk = slice(start, start + _CHUNK)
+            for chunk in slices(flat.size, _CHUNK):
                 hats = hat_transform(self.rings.tobytes(), flat[chunk].tobytes(), order)
                 transform[chunk] = hats @ values
         return transform.reshape(np.shape(k))

@@ -33,7 +33,7 @@ from memscal.mechanics.film_response import (
     corrections,
     half_space_coupling,
 )
-from memscal.model.arrays import BoolArray, FloatArray, array_record
+from memscal.model.arrays import BoolArray, FloatArray, array_record, slices
 from memscal.model.film import ElasticFilm
 
 
@@ -163,8 +163,8 @@ class RodTraction:
             return np.zeros(np.shape(k))
         flat = np.ravel(k) * self.radius
         sums = [
-            terms @ spherical_bessel(2 * terms.size, flat[start : start + _CHUNK])[first::2]
-            for start in range(0, flat.size, _CHUNK)
+            terms @ spherical_bessel(2 * terms.size, flat[chunk])[first::2]
+            for chunk in slices(flat.size, _CHUNK)
         ]
         values = self.load / (2 * np.pi) * np.concatenate(sums) if sums else flat
         return values.reshape(np.shape(k))

@@ -139,6 +139,11 @@ def unmasked(values: Any) -> Any:
     return np.ma.array(values, dtype=object).filled(np.nan) if masked else values
 
 
+def slices(count: int, most: int) -> list[slice]:
+    """Return slices of up to so many items each, which together cover ``count`` of them."""
+    return [slice(start, min(start + most, count)) for start in range(0, count, most)]
+
+
 def frozen_array(values: ArrayLike, *, dtype: Any = np.float64) -> NDArray[Any]:
     """Return a read-only copy, so that a frozen dataclass stays frozen; NaN where it is masked."""
     array = np.array(unmasked(values), dtype=dtype)

@@ -31,7 +31,7 @@ from memscal.axisymmetry.hankel import gauss_between, hankel_transform
 from memscal.errors import DomainError
 from memscal.mechanics.elements.mesh import TriangleMesh, film_triangles
 from memscal.mechanics.surface import SurfaceCompliance, anticlockwise
-from memscal.model.arrays import ArrayFunction, FloatArray, IndexArray, Values, array_record
+from memscal.model.arrays import ArrayFunction, FloatArray, IndexArray, Values, array_record, slices
 from memscal.model.field_mesh import FieldMesh
 from memscal.model.film import ElasticFilm
 from memscal.progress import Task
@@ -309,8 +309,7 @@ class ElementFilm:
         task = Task("tractions", 2 * rings.size)
         done = 0
         for source, unknowns in enumerate((inward, outward)):
-            for start in range(0, rings.size, _BATCH):
-                batch = slice(start, start + _BATCH)
+            for batch in slices(rings.size, _BATCH):
                 solution = system.solve(unknowns, hats[:, batch].toarray())
                 moved[source, 0, :, batch] = scale * (seen @ solution[inward])
                 moved[source, 1, :, batch] = scale * (seen @ solution[outward])
