@@ -72,9 +72,8 @@ class EvenGrid:
         """Return the even field of a real even spectrum."""
         return scipy.fft.idctn(spectrum, type=1) / self.cell_area
 
-    def transfer(self, field: FloatArray) -> FloatArray:
-        """Fourier transform about the origin, where an even field's axis already is."""
-        return self.forward(field)
+    #: Of an even field the axis already is at the origin.
+    transfer = forward
 
     def axis_transfer(self, field: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return wavenumbers along one axis and the Fourier transform about the origin there."""
@@ -244,16 +243,14 @@ class Lattice:
         return Lattice(axis(n * factor, dx), axis(m * factor, dy)), scipy.fft.fftshift(fine)
 
     def to_period(self, field: FloatArray) -> FloatArray:
-        """Return the field itself: a lattice is its own period."""
+        """Return the field itself: it covers the plane, and is its own period."""
         return field
+
+    to_image = to_period
 
     def from_quotient(self, period: FloatArray) -> FloatArray:
         """Roll the quotient's zero from the first point to the central one."""
         return scipy.fft.fftshift(period)
-
-    def to_image(self, field: FloatArray) -> FloatArray:
-        """Return the field itself: it already covers the plane."""
-        return field
 
     def from_image(self, image: FloatArray) -> FloatArray:
         """Return the image itself."""

@@ -20,7 +20,7 @@ from memscal.calibration.drawn_scatter import drawn_scatter
 from memscal.calibration.explanations import explained
 from memscal.calibration.fields import RasterFields
 from memscal.calibration.film_inference import free_thickness, require_free, weigh_laws
-from memscal.calibration.prepare import Prepared, Reference, Request, prepare
+from memscal.calibration.prepare import Prepared, References, Request, prepare
 from memscal.calibration.stages import Deconvolution, Solution, solve
 from memscal.calibration.uncertainty import Correlations, Effects, Results, input_effects, propagate
 from memscal.deconvolution.division import Method, chosen_method
@@ -126,8 +126,8 @@ class Calibration(Result):
 def calibrate(
     scan: Scans,
     *,
-    reference: Reference | Sequence[Reference] = None,
-    alternative: Reference | Sequence[Reference] = None,
+    reference: References = None,
+    alternative: References = None,
     film_law: str | None = None,
     mooney_rivlin_ratio: float | None = None,
     rod_friction: float | None = None,

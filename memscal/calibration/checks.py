@@ -46,6 +46,8 @@ from memscal.model.checks import (
 from memscal.model.film import LINEAR
 from memscal.model.notation import format_measured
 
+_Checks = Iterator[QualityCheck]
+
 #: The Bayes factor of a Gaussian sensor has mean one, and exceeds a thousand at most once in a
 #: thousand (Markov's inequality).
 _LOG_BAYES_LIMIT = -float(np.log(FALSE_ALARM))
@@ -84,7 +86,7 @@ def quality_checks(
     results: Results,
     other: Results | None,
     assumed: Sequence[Assumption],
-) -> Iterator[QualityCheck]:
+) -> _Checks:
     """Run every check that applies to the scan; ``other``: results by the other route."""
     division = results.division or (other.division if other else None)
     estimate = solution.estimate
@@ -105,7 +107,7 @@ def quality_checks(
     yield from _saturation(estimate)
 
 
-def _reconvolutions(solution: Solution) -> Iterator[QualityCheck]:
+def _reconvolutions(solution: Solution) -> _Checks:
     removed = (
         "the posterior mean of G misses something that the scan shows"
         if isinstance(solution.method, Bayesian)
@@ -146,7 +148,7 @@ def _misfit_limit(estimate: ProfileEstimate, degrees: float) -> float:
     return (noise.degrees + rest * largest) / degrees
 
 
-def _constraint(solution: Solution) -> Iterator[QualityCheck]:
+def _constraint(solution: Solution) -> _Checks:
     """Compare a G that was kept from falling below zero, or from rising, with the free one."""
     method = solution.method
     estimate = solution.estimate
@@ -168,9 +170,7 @@ def _constraint(solution: Solution) -> Iterator[QualityCheck]:
     )
 
 
-def _agreement(
-    solution: Solution, results: Results, division: DivisionMap | None
-) -> Iterator[QualityCheck]:
+def _agreement(solution: Solution, results: Results, division: DivisionMap | None) -> _Checks:
     """Compare the results of both routes, and the width of G with the one fitted to the scan."""
     difference = route_difference(solution, division)
     if difference is not None:
@@ -201,7 +201,7 @@ def _agreement(
     )
 
 
-def _shape(solution: Solution, parameters: ParameterSet) -> Iterator[QualityCheck]:
+def _shape(solution: Solution, parameters: ParameterSet) -> _Checks:
     """Look for what divisions that went wrong do to G: spikes, lobes and ripples."""
     deconvolution = solution.deconvolution
     g = deconvolution.g
@@ -240,7 +240,7 @@ def _shape(solution: Solution, parameters: ParameterSet) -> Iterator[QualityChec
     )
 
 
-def _field_shape(solution: Solution, results: Results) -> Iterator[QualityCheck]:
+def _field_shape(solution: Solution, results: Results) -> _Checks:
     """Look over the plane, of a raster, for lobes of G and for residuals that are no noise."""
     fields = solution.fields
     estimate = solution.estimate
@@ -272,7 +272,7 @@ def _field_shape(solution: Solution, results: Results) -> Iterator[QualityCheck]
     )
 
 
-def _set_up(solution: Solution) -> Iterator[QualityCheck]:
+def _set_up(solution: Solution) -> _Checks:
     """Film, band, reach, baseline, force and outliers."""
     estimate = solution.estimate
     film = solution.scan.film
@@ -315,7 +315,7 @@ def _set_up(solution: Solution) -> Iterator[QualityCheck]:
     yield outlier_check(estimate.outlier_weight, "the points that the messages name")
 
 
-def _baseline(estimate: ProfileEstimate) -> Iterator[QualityCheck]:
+def _baseline(estimate: ProfileEstimate) -> _Checks:
     points = estimate.points
     last = 1 + int(points.free[0].sum())
     yield check(
@@ -341,9 +341,7 @@ def _baseline(estimate: ProfileEstimate) -> Iterator[QualityCheck]:
         yield check("baseline_curvature", share.max(), _CURVED, meaning)
 
 
-def _indentation(
-    solution: Solution, results: Results, assumed: Sequence[Assumption]
-) -> Iterator[QualityCheck]:
+def _indentation(solution: Solution, results: Results, assumed: Sequence[Assumption]) -> _Checks:
     """Compare what a film's law would change, where nothing is counted for it, with u."""
     film = solution.scan.film
     if film is None or film.law not in ("", LINEAR) or "model_form" in results.changes:
@@ -369,7 +367,7 @@ def _indentation(
     )
 
 
-def _unexplained(estimate: ProfileEstimate, results: Results) -> Iterator[QualityCheck]:
+def _unexplained(estimate: ProfileEstimate, results: Results) -> _Checks:
     """Test what no G explains: its size against the noise, and its order along the scan."""
     model = free_model(estimate)
     residuals = residuals_of(estimate, model)
@@ -468,7 +466,7 @@ def _symmetry(estimate: ProfileEstimate) -> QualityCheck:
     )
 
 
-def _steadiness(solution: Solution) -> Iterator[QualityCheck]:
+def _steadiness(solution: Solution) -> _Checks:
     """Test whether A, centre and baseline are the same at all loads, branches and repeats."""
     estimate = solution.estimate
     linear = model_tests.linearity_test(estimate)
@@ -492,7 +490,7 @@ def _steadiness(solution: Solution) -> Iterator[QualityCheck]:
         yield _tested("repeat_centres", apart, meaning)
 
 
-def _hysteresis(estimate: ProfileEstimate) -> Iterator[QualityCheck]:
+def _hysteresis(estimate: ProfileEstimate) -> _Checks:
     """Compare approach with retreat where scans say which is which."""
     branches = hysteresis_test(estimate)
     if branches is None:
@@ -520,7 +518,7 @@ def _hysteresis(estimate: ProfileEstimate) -> Iterator[QualityCheck]:
     )
 
 
-def _runs(estimate: ProfileEstimate) -> Iterator[QualityCheck]:
+def _runs(estimate: ProfileEstimate) -> _Checks:
     """Compare the offset and the noise of each repeat and scan with those of the others."""
     runs = compare_runs(estimate)
     if runs is None:
@@ -553,7 +551,7 @@ def _runs(estimate: ProfileEstimate) -> Iterator[QualityCheck]:
     )
 
 
-def _held_out(estimate: ProfileEstimate) -> Iterator[QualityCheck]:
+def _held_out(estimate: ProfileEstimate) -> _Checks:
     """Predict each repeat, load and scan from the others, whichever there are several of."""
     groups = {
         "scan": estimate.points.owner,
@@ -571,7 +569,7 @@ def _held_out(estimate: ProfileEstimate) -> Iterator[QualityCheck]:
         yield from _prediction(estimate, what, groups[what])
 
 
-def _prediction(estimate: ProfileEstimate, what: str, group: IndexArray) -> Iterator[QualityCheck]:
+def _prediction(estimate: ProfileEstimate, what: str, group: IndexArray) -> _Checks:
     worst = model_tests.hold_out(estimate, group)
     if worst is None:
         return
@@ -596,7 +594,7 @@ def _prediction(estimate: ProfileEstimate, what: str, group: IndexArray) -> Iter
     )
 
 
-def _saturation(estimate: ProfileEstimate) -> Iterator[QualityCheck]:
+def _saturation(estimate: ProfileEstimate) -> _Checks:
     points = estimate.points
     if estimate.points.order:
         return

@@ -40,6 +40,9 @@ Reference: TypeAlias = (
 )
 """A base stress, an ideal reference, the path or name of one, or nothing: the rod is solved."""
 
+References: TypeAlias = Reference | Sequence[Reference]
+"""One of all scans, or one of each."""
+
 
 #: A load in N under which a rod hardly sinks.
 _LIGHT = 1e-6
@@ -50,8 +53,8 @@ class Request:
     """What a calibration is asked for; :func:`memscal.calibrate` describes each."""
 
     method: Method
-    reference: Reference | Sequence[Reference]
-    alternative: Reference | Sequence[Reference]
+    reference: References
+    alternative: References
     film_law: str | None
     mooney_rivlin_ratio: float | None
     rod_friction: float | None
@@ -192,7 +195,7 @@ def _without_loads(scan: Scan, stress: BaseStress | None) -> Scan:
 
 
 def _references(
-    reference: Reference | Sequence[Reference], scans: Sequence[Scan], request: Request
+    reference: References, scans: Sequence[Scan], request: Request
 ) -> list[BaseStress | None]:
     """Read a reference for each scan; a single one is that of all scans."""
     loads = scans[0].normal_load
@@ -221,7 +224,7 @@ def _read(reference: Reference, load: float, request: Request) -> BaseStress | N
     if isinstance(reference, StressProfile) and reference.form is not None:
         stated = reference.form.load if isinstance(reference.form, StressField) else None
         return replace(reference, load=stated or load)
-    if reference is None or isinstance(reference, StressProfile | Contact):
+    if reference is None or isinstance(reference, BaseStress):
         return reference
     raise InputError(
         f"The reference is a {type(reference).__name__}.",

@@ -41,9 +41,9 @@ from memscal.estimation.reference_spectra import (
 )
 from memscal.estimation.smoothing import SmoothedProfile
 from memscal.estimation.voltage_map import DENSE, VoltageMap, square_root, triangular
-from memscal.mechanics.contact import Contact
+from memscal.mechanics.contact import BaseStress
 from memscal.model.apparatus import ParameterSet
-from memscal.model.arrays import TINY, FloatArray, array_record, slices
+from memscal.model.arrays import TINY, Arrays, FloatArray, array_record, slices
 from memscal.model.assumptions import MOVED
 from memscal.model.scan import STATED_ERRORS, Scan
 from memscal.model.stress import StressProfile
@@ -92,7 +92,7 @@ Correlations = Mapping[tuple[str, str], float]
 
 def input_effects(
     scans: Sequence[Scan],
-    stresses: Sequence[StressProfile | Contact],
+    stresses: Sequence[BaseStress],
     estimate: ProfileEstimate,
     alternatives: Sequence[RadialSpectrum] | None = None,
 ) -> dict[str, InputEffect]:
@@ -139,7 +139,7 @@ def _taken_for_granted(scans: Sequence[Scan], estimate: ProfileEstimate) -> dict
 
 
 def _load_effects(
-    scans: Sequence[Scan], stresses: Sequence[StressProfile | Contact], estimate: ProfileEstimate
+    scans: Sequence[Scan], stresses: Sequence[BaseStress], estimate: ProfileEstimate
 ) -> dict[str, InputEffect]:
     """Effects of factors: loads, forces of references, and their discretisation."""
     pairs = zip(stresses, estimate.model.references, strict=True)
@@ -214,7 +214,7 @@ class Results:
     """Everything a calibration states with an uncertainty."""
 
     parameters: ParameterSet  # scalars with their joint covariance
-    changes: Mapping[str, FloatArray]  # (p,) by input: of the parameters, by one uncertainty of it
+    changes: Arrays  # (p,) by input: of the parameters, by one uncertainty of it
     budget: Mapping[str, Mapping[str, float]]  # standard uncertainties by parameter and source
     radial_covariance: FloatArray  # (n, n): covariance of G(r), in 1/m^4
     cross_covariance: FloatArray  # (n, p): covariance of G(r) with the parameters, in their units
@@ -223,7 +223,7 @@ class Results:
     by_voltage: VoltageMap  # (p, n): derivatives of the parameters
     effective_degrees: Mapping[str, float]  # by parameter, where noise is estimated
     # (n,) by input, where none are correlated: of A G(r) over A by one uncertainty, in 1/m^2
-    kernel_changes: Mapping[str, FloatArray]
+    kernel_changes: Arrays
     division: DivisionMap | None = None  # that was propagated
     field_errors: FloatArray | None = None  # (m, n): of a raster's G over the plane, in 1/m^2
 
@@ -233,7 +233,7 @@ class DrawnScatter:
     """Columns of m draws less their mean over sqrt(m - 1): their squares add up to variances."""
 
     voltages: FloatArray  # (n, m): of the measured points, in V
-    parameters: Mapping[str, FloatArray]  # (m,): of each number that the division decides, in SI
+    parameters: Arrays  # (m,): of each number that the division decides, in SI
     radial: FloatArray  # (p, m): of G at its radii, in 1/m^2
     transfer: FloatArray  # (q, m): of the transfer function at the grid's wavenumbers
 
@@ -412,9 +412,7 @@ def drawn_about(solution: Solution) -> FloatArray:
     return solution.estimate.predicted if deconvolution.divided else deconvolution.predicted
 
 
-def _budget(
-    row: int, columns: Mapping[str, FloatArray], covariance: FloatArray
-) -> dict[str, float]:
+def _budget(row: int, columns: Arrays, covariance: FloatArray) -> dict[str, float]:
     """Contribution of each source; of correlations with the sign of what they add."""
     budget = {source: float(np.linalg.norm(column[row])) for source, column in columns.items()}
     variance = covariance[row, row]

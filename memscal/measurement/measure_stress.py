@@ -49,6 +49,7 @@ _BLIND = (
 )
 #: The restoration's check of the force is replaced by that of the profile.
 _REPLACED = "restored_force"
+_Measured = tuple[MeasuredProfile, Sequence[QualityCheck], list[Message]]
 #: Checks that compare the scatter with a stated noise.
 _NOISE_CHECKS = ("noise_as_stated", "chi_square")
 
@@ -263,7 +264,7 @@ def _contents(profile: MeasuredProfile) -> tuple[str, tuple[bytes, ...]]:
 
 def _measured_loads(
     origins: Sequence[MeasuredScan], singles: Sequence[Sequence[Scan]], sensor: ApparatusFunction
-) -> Iterator[tuple[MeasuredProfile, Sequence[QualityCheck], list[Message]]]:
+) -> Iterator[_Measured]:
     for origin, loads in zip(origins, singles, strict=True):
         signals = one_load.contact_signals(loads, sensor)
         for single, signal in zip(loads, signals, strict=True):
@@ -272,7 +273,7 @@ def _measured_loads(
 
 def _measure(
     origin: MeasuredScan, scan: Scan, sensor: ApparatusFunction, signal: one_load.ContactSignal
-) -> tuple[MeasuredProfile, Sequence[QualityCheck], list[Message]]:
+) -> _Measured:
     """Return the profile of a scan of one load, with checks and messages of its restoration."""
     one_load.require_points(scan, signal)
     try:

@@ -32,7 +32,7 @@ from memscal.mechanics.indent import indent
 from memscal.mechanics.interface import Interface
 from memscal.mechanics.solver.refinement import RingRequest, solve_on_rings
 from memscal.mechanics.solver.step import Load
-from memscal.model.arrays import FloatArray, array_record
+from memscal.model.arrays import Arrays, FloatArray, array_record
 from memscal.model.correlation import is_banded
 from memscal.model.indenter import Rod
 from memscal.model.measured_stress import MeasuredPoints, MeasuredProfile, MeasuredScan
@@ -434,7 +434,7 @@ def _channel_points(
     )
 
 
-def _place_roots(restored: Restoration, average: Any) -> Mapping[str, FloatArray]:
+def _place_roots(restored: Restoration, average: Any) -> Arrays:
     """Roots of the covariance that centre, baseline and drift bring, shared out without a rest."""
     posterior = restored.posterior
     model = posterior.estimate.model

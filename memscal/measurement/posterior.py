@@ -25,7 +25,7 @@ stress by the wrong :math:`T`.
 """
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from functools import lru_cache, reduce
 from operator import add
@@ -309,9 +309,9 @@ class Posterior:
 
     estimate: ProfileEstimate  # the best Gaussian pressure, noise and outliers
     state: FloatArray  # (s,): stress at the nodes (N), free centre (m), baseline, drift (V)
-    covariances: Mapping[str, FloatArray]  # (s, s) by source, independent
-    shifts: Mapping[str, FloatArray]  # (n, q) by source: change of the voltages, in V
-    changes: Mapping[str, FloatArray]  # (s, q) by source: change of the state
+    covariances: Arrays  # (s, s) by source, independent
+    shifts: Arrays  # (n, q) by source: change of the voltages, in V
+    changes: Arrays  # (s, q) by source: change of the state
     film_inputs: tuple[str, ...]  # whose uncertainties the columns of source ``film`` are
     nodes: int  # how many entries of the state are the transform
     first_drift: int  # place of the baseline, behind the free centre

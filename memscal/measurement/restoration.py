@@ -14,7 +14,7 @@ from memscal.errors import InputError
 from memscal.estimation.points import ScanPoints
 from memscal.formats.reference import read_reference
 from memscal.measurement.posterior import Posterior, film_transfer, reach_of, sensor_changes
-from memscal.mechanics.contact import Contact
+from memscal.mechanics.contact import BaseStress, Contact
 from memscal.model.arrays import FloatArray, array_record
 from memscal.model.checks import (
     OVERRIDE,
@@ -33,7 +33,7 @@ from memscal.model.stress import StressProfile
 #: Loads of a curved indenter may differ by this share: its stress is not proportional to them.
 SAME_LOAD = 0.01
 
-Expected: TypeAlias = StressProfile | Contact | str | PathLike[str] | None
+Expected: TypeAlias = BaseStress | str | PathLike[str] | None
 """A base stress to compare with, or the path of a file that holds one."""
 
 #: Coverage factor of 95 %.
@@ -47,7 +47,7 @@ _OF_RESTORED = "Measured, not calculated: restored with an apparatus function."
 class StressComparison:
     """How a calculated stress agrees with a scan and with the stress restored from it."""
 
-    stress: StressProfile | Contact
+    stress: BaseStress
     sigma_zz: FloatArray  # (n,): calculated, at the restoration's radii, in Pa
     chi_square: float  # reduced, of the scan against the calculated stress convolved with A G
     degrees: int
@@ -243,7 +243,7 @@ class Restoration(Result, Checked):
         """
         if isinstance(expected, str | PathLike):
             expected = read_reference(expected)
-        if isinstance(expected, StressProfile | Contact):
+        if isinstance(expected, BaseStress):
             return _compared(self, expected)
         raise InputError(
             f"The expected stress is a {type(expected).__name__}.",
@@ -305,7 +305,7 @@ class Restoration(Result, Checked):
         return wavenumbers.synthesise(np.eye(wavenumbers.k.size), radii)
 
 
-def _compared(restored: Restoration, stress: StressProfile | Contact) -> StressComparison:
+def _compared(restored: Restoration, stress: BaseStress) -> StressComparison:
     """Compare a calculated stress, scaled to a rod's load, with scan and restoration."""
     scan = restored.scan
     _, indenter, load, _ = scan.set_up
