@@ -124,6 +124,8 @@ class _Own:
     """Base of memscal's regularisers: refuses values of their options that mean nothing."""
 
     name: ClassVar[str]
+    assumes: ClassVar[str]
+    fails: ClassVar[str]
 
     def __post_init__(self) -> None:
         options = vars(self)
@@ -144,13 +146,9 @@ class WhiteNoise(_Own):
 
     # White noise n leaves the numerator's mean; E[1/(z + n)] = (1 - exp(-|z|^2/s^2))/z.
     amplitude: float = 1.0  # of the noise: s over a tenth of the weakest relevant component
-    name: ClassVar[str] = "white-noise"
-    assumes: ClassVar[str] = (
-        "G is negligible beyond the wavenumber where the voltage sinks into its noise."
-    )
-    fails: ClassVar[str] = (
-        "A G with fine detail (sharp edges, a narrow ring) is smoothed to the resolved band."
-    )
+    name = "white-noise"
+    assumes = "G is negligible beyond the wavenumber where the voltage sinks into its noise."
+    fails = "A G with fine detail (sharp edges, a narrow ring) is smoothed to the resolved band."
 
     def divide(self, problem: DivisionProblem) -> Division:
         """Divide with the expected window."""
@@ -165,9 +163,9 @@ class WhiteNoiseDraw(_Own):
 
     amplitude: float = 1.0  # of the noise, as in WhiteNoise
     seed: int = 0
-    name: ClassVar[str] = "white-noise-draw"
-    assumes: ClassVar[str] = WhiteNoise.assumes
-    fails: ClassVar[str] = "Draws are heavy-tailed: some carry ripples that others do not."
+    name = "white-noise-draw"
+    assumes = WhiteNoise.assumes
+    fails = "Draws are heavy-tailed: some carry ripples that others do not."
 
     def divide(self, problem: DivisionProblem) -> Division:
         """Divide one draw; the window is that of its expectation."""
@@ -192,9 +190,9 @@ class Tikhonov(_Own):
     # Its window closes more slowly than the white noise's, at the same wavenumber: sqrt(alpha) is
     # the paper's noise amplitude.
     amplitude: float = 1.0  # root of alpha over a tenth of the weakest relevant component
-    name: ClassVar[str] = "tikhonov"
-    assumes: ClassVar[str] = "G has little power; all wavenumbers are equally likely to carry it."
-    fails: ClassVar[str] = "Every component is a little too small, the peak of G with them."
+    name = "tikhonov"
+    assumes = "G has little power; all wavenumbers are equally likely to carry it."
+    fails = "Every component is a little too small, the peak of G with them."
 
     def divide(self, problem: DivisionProblem) -> Division:
         """Divide with the Tikhonov window."""
@@ -208,11 +206,9 @@ class Wiener(_Own):
     """Wiener-Hunt restoration: the quotient with a Laplacian penalty."""
 
     amplitude: float = 1.0  # root of the penalty over a tenth of the weakest relevant component
-    name: ClassVar[str] = "wiener"
-    assumes: ClassVar[str] = "G is smooth; the noise of the lifted field is white."
-    fails: ClassVar[str] = (
-        "A lifted line scan has ring-shaped noise, not white: the penalty is a guess."
-    )
+    name = "wiener"
+    assumes = "G is smooth; the noise of the lifted field is white."
+    fails = "A lifted line scan has ring-shaped noise, not white: the penalty is a guess."
 
     def divide(self, problem: DivisionProblem) -> Division:
         """Divide by scikit-image's Wiener-Hunt filter."""

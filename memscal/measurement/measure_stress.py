@@ -21,7 +21,6 @@ from memscal.model.checks import (
     NOISE_UNSTATED,
     Message,
     QualityCheck,
-    QualityChecks,
     check,
     failed_check_messages,
     override_messages,
@@ -56,9 +55,8 @@ _NOISE_CHECKS = ("noise_as_stated", "chi_square")
 
 def stress_checks(
     profiles: Sequence[MeasuredProfile], restored: Sequence[Sequence[QualityCheck]]
-) -> QualityChecks:
-    """Return each profile's checks (``restored``), numbered from one, then that of all."""
-    checks = []
+) -> Iterator[QualityCheck]:
+    """Yield each profile's checks (``restored``), numbered from one, then that of all."""
     for number, (profile, others) in enumerate(zip(profiles, restored, strict=True), start=1):
         allowed = math.hypot(*_relative(profile).values(), restore.NEGLIGIBLE_FORCE)
         off = abs(profile.force / profile.load - 1) / allowed
@@ -74,10 +72,9 @@ def stress_checks(
         )
         for own in (force, *others):
             meaning = f"{profile.label}: {own.meaning}"
-            checks.append(replace(own, name=f"{own.name}_{number}", meaning=meaning))
+            yield replace(own, name=f"{own.name}_{number}", meaning=meaning)
     if len(profiles) > 1:
-        checks.append(check_of_all_forces(profiles))
-    return tuple(checks)
+        yield check_of_all_forces(profiles)
 
 
 def pooled_force(profiles: Sequence[MeasuredProfile]) -> tuple[float, float]:
@@ -198,7 +195,7 @@ def measure_stress(
     loads = _measured_loads(origins, singles, sensor)
     measured = Task("loads", sum(map(len, singles))).counted(loads)
     profiles, restored, notes = zip(*measured, strict=True)
-    checks = stress_checks(profiles, restored)
+    checks = tuple(stress_checks(profiles, restored))
     return MeasuredStress(
         profiles=profiles,
         scans=origins,

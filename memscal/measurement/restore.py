@@ -30,7 +30,6 @@ from memscal.model.checks import (
     FAILED_CALIBRATION,
     NOISE_UNSTATED,
     Message,
-    Messages,
     QualityCheck,
     added_check,
     check,
@@ -315,20 +314,18 @@ def _expected(compared: StressComparison) -> QualityCheck:
     )
 
 
-def restoration_messages(restored: Restoration, checks: Sequence[QualityCheck]) -> Messages:
-    """Return the messages that accompany a result, warnings first."""
+def _messages(restored: Restoration, checks: Sequence[QualityCheck]) -> Iterator[Message]:
+    """Yield the messages that accompany a result, warnings first."""
     points = restored.points
-    messages = failed_check_messages(checks)
-    messages += failed_calibration_messages(restored.apparatus)
-    messages += point_messages(restored.posterior.estimate)
+    yield from failed_check_messages(checks)
+    yield from failed_calibration_messages(restored.apparatus)
+    yield from point_messages(restored.posterior.estimate)
     if points.u_errors is None:
-        messages.append(noise_unstated_message(points.reading.text(restored.noise.min())))
+        yield noise_unstated_message(points.reading.text(restored.noise.min()))
     if not restored.apparatus.radial_profile.g_errors.any():
-        messages.append(
-            Message(
-                "uncertainty_unstated",
-                "The artifact states no uncertainty of G: nothing is counted for it.",
-            )
+        yield Message(
+            "uncertainty_unstated",
+            "The artifact states no uncertainty of G: nothing is counted for it.",
         )
     film = restored.scan.set_up.film
     unstated = {
@@ -336,7 +333,7 @@ def restoration_messages(restored: Restoration, checks: Sequence[QualityCheck]) 
         "Poisson's ratio": film.poisson_ratio_uncertainty,
         "load": restored.scan.load_uncertainty,
     }
-    return tuple(messages + uncertainty_unstated_messages(unstated))
+    yield from uncertainty_unstated_messages(unstated)
 
 
 def failed_calibration_messages(apparatus: ApparatusFunction) -> list[Message]:
@@ -445,7 +442,7 @@ def restore_known(
     if expected is not None:
         restored = replace(restored, comparison=restored.compare(expected))
     checks = tuple(_checks(restored))
-    return replace(restored, checks=checks, messages=restoration_messages(restored, checks))
+    return replace(restored, checks=checks, messages=tuple(_messages(restored, checks)))
 
 
 def gaussian_pressure(
