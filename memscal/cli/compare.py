@@ -175,7 +175,6 @@ def command(
     out.prove_writable(outputs, force=force, inputs=inputs)
     friction = options["friction"]
     settings = {name: options[name] for name in _SETTINGS}
-    settings["between_scan_gain"] = options["between_scan_gain"] / 100
     with out.working("Comparing with calculated contacts"):
         comparison = compare(
             data,
@@ -243,6 +242,7 @@ def _drawn(comparison: FrictionComparison, named: Mapping[str, Path]) -> dict[Pa
 _SETTINGS = (
     "lubricated",
     "lubricated_friction",
+    "between_scan_gain",
     "macroscopic",
     "macroscopic_uncertainty",
     "interface",

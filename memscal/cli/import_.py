@@ -27,7 +27,6 @@ from memscal.cli.options import (
     output_options,
     radius_options,
     rod_friction_option,
-    si,
     with_laboratory,
 )
 from memscal.extensions import hook
@@ -56,10 +55,6 @@ def _read_reference(path: Path, mesh: bool, options: Options) -> ImportedProfile
         return read_reference_table(path, reading=_stated(options, _READING), **setting)
 
     setting |= _stated(options, _MESH_ONLY)
-    if "base" in setting:
-        setting["base"] = si(setting["base"], -3)
-    if "centre" in setting:
-        setting["centre"] = tuple(si(position, -3) for position in setting["centre"])
     profile: ImportedProfile = hook("read_reference_mesh")(path, **setting)
     return profile
 
@@ -104,6 +99,7 @@ _COLUMNS = (
     "time",
 )
 _OF_HOLDS = ("depth_unit", "baseline")
+_MADE = ("speed", "step")
 _LAYOUT = (
     "x_unit",
     "u_unit",
@@ -114,21 +110,23 @@ _LAYOUT = (
     "ceiling",
     "scan",
     *_OF_HOLDS,
+    *_MADE,
 )
-_MADE = ("speed", "step")
 _CONDITIONS = ("rod_friction", "lubrication", "lubricant", "title")
-_UNCERTAINTIES = ("noise", "load_uncertainty", "position_errors_by_repeat")
-#: Powers of ten of the units in which what a scan takes for granted is stated.
-_TAKEN_FOR_GRANTED = {
-    "position_scale_uncertainty": -2,
-    "gain_uncertainty": -2,
-    "gain_curvature_uncertainty": 0,
-    "roundness_uncertainty": 0,
-    "line_offset_uncertainty": -3,
-    "base_slip_uncertainty": 0,
-    "baseline_curvature_uncertainty": 0,
-    "shear_sensitivity_uncertainty": -3,
-}
+_UNCERTAINTIES = (
+    "noise",
+    "load_uncertainty",
+    "load_scatter",
+    "position_errors_by_repeat",
+    "position_scale_uncertainty",
+    "gain_uncertainty",
+    "gain_curvature_uncertainty",
+    "roundness_uncertainty",
+    "line_offset_uncertainty",
+    "base_slip_uncertainty",
+    "baseline_curvature_uncertainty",
+    "shear_sensitivity_uncertainty",
+)
 _CELL_NAMES = {"name": "load_cell", "serial_number": "load_cell_serial"}
 _SENSOR_NAMES = {"name": "sensor_name", "model": "sensor_model", "channel": "channel"}
 _SIGNS = ("u_sign", "sign", "shear_sign")
@@ -138,10 +136,7 @@ _ONLY = {
         *_LAYOUT,
         *_CONDITIONS,
         *_UNCERTAINTIES,
-        *_TAKEN_FOR_GRANTED,
-        "load_scatter",
         "position_error",
-        *_MADE,
         "figure",
         "laboratory",
         *_SENSOR_NAMES.values(),
@@ -444,17 +439,12 @@ def _read_scan(path: Path, options: Options) -> ImportedScan:
     )
     uncertainties = ScanUncertainties(
         **_stated(options, _UNCERTAINTIES),
-        load_scatter=si(options["load_scatter"], -2),
-        x_error=si(options["position_error"], -6),
-        **{name: si(options[name], power) for name, power in _TAKEN_FOR_GRANTED.items()},
+        x_error=options["position_error"],
     )
     return import_table(
         path,
         **_stated(options, _COLUMNS),
-        layout=TableLayout(
-            **_stated(options, (*_LAYOUT, *_READING)),
-            **{name: si(options[name], -3) for name in _MADE},
-        ),
+        layout=TableLayout(**_stated(options, (*_LAYOUT, *_READING))),
         conditions=conditions,
         uncertainties=uncertainties,
     )

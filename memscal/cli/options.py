@@ -54,8 +54,30 @@ def scans_argument(metavar: str = "SCAN...") -> _Adder:
     return click.argument("scans", type=FILE, nargs=-1, required=True, metavar=metavar)
 
 
+#: Powers of ten that take what is given to SI units.
+_POWERS = {
+    "um": -6,
+    "mm": -3,
+    "mm/s": -3,
+    "mV": -3,
+    "mV/Pa": -3,
+    "percent": -2,
+    "MPa": 6,
+    "1/mm^2": 6,
+}
+
+
+def si(value: float, power: int) -> float:
+    """Return a value times a power of ten, rounded as if it had been typed so."""
+    if not math.isfinite(value):
+        return value
+    from decimal import Decimal
+
+    return float(Decimal(repr(value)).scaleb(power))
+
+
 class Quantity(_Number):
-    """A finite number in a unit, which is shown as the name of the value."""
+    """A finite number in a unit, the name of the value; it becomes one in SI units."""
 
     def __init__(
         self,
@@ -75,7 +97,7 @@ class Quantity(_Number):
     def convert(
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
     ) -> float:
-        """Read the number; refuse one out of range."""
+        """Read the number; refuse one out of range; return it in SI units."""
         in_unit = f" (in {self.name})" if self.name != "ratio" else ""
         try:
             number = float(str(value).replace("_", "?"))  # 1_0 is a number of Python alone
@@ -86,7 +108,7 @@ class Quantity(_Number):
         above = number > self.low if self.open_low else number >= self.low
         if not (finite and above and number <= self.high):
             self.fail(f"{value} is not {self._range}{in_unit}.", param, ctx)
-        return number
+        return si(number, _POWERS.get(self.name, 0))
 
     def get_metavar(self, *_: Any, **__: Any) -> str:
         """Return the unit as the name of the value: MM, but MPa."""
@@ -183,8 +205,8 @@ report_options = options_of(brief_option, report_option, output_options)
 
 #: Those of memscal.model.film, which takes longer to import than help may; a test compares them.
 FILM_LAWS = ("linear", "neo-hookean", "mooney-rivlin")
-FILM = {"young_modulus": 6, "poisson_ratio": 0, "thickness": -3}
-"""What describes a film, by the names of its options, with the powers of ten of their units."""
+FILM = ("young_modulus", "poisson_ratio", "thickness")
+"""What describes a film, by the names of its options."""
 LAW = ("film_law", "mooney_rivlin_ratio")
 """What describes its law."""
 
@@ -262,15 +284,6 @@ def _measured(
     )
 
 
-def si(value: float | None, power: int) -> Any:
-    """Return a value, if any, times a power of ten, rounded as if it had been typed so."""
-    if value is None or not math.isfinite(value):
-        return value
-    from decimal import Decimal
-
-    return float(Decimal(repr(value)).scaleb(power))
-
-
 def film_from(options: Options, otherwise: str = "") -> ElasticFilm:
     """Return the film that the options describe; ``otherwise``: what to do without one of them."""
     _require("The film", options, FILM, otherwise)
@@ -282,11 +295,8 @@ def film_from(options: Options, otherwise: str = "") -> ElasticFilm:
         )
     from memscal.model.film import ElasticFilm
 
-    numbers = {}
-    for name, power in FILM.items():
-        spread = f"{name}_uncertainty"
-        numbers[name] = si(options[name], power)
-        numbers[spread] = si(options.get(spread), power)
+    names = [*FILM, *(f"{name}_uncertainty" for name in FILM)]
+    numbers: Options = {name: options.get(name) for name in names}
     return ElasticFilm(law=law, mooney_rivlin_ratio=ratio, **numbers)
 
 
@@ -296,8 +306,8 @@ def indenter_from(shape: str, options: Options) -> RoundIndenter:
     from memscal.model.indenter import Rod, Sphere
 
     kind = {"rod": Rod, "sphere": Sphere}[shape]
-    spread = si(options.get("radius_uncertainty"), -3)
-    return kind(radius=si(options["radius"], -3), radius_uncertainty=spread)
+    spread = options.get("radius_uncertainty")
+    return kind(radius=options["radius"], radius_uncertainty=spread)
 
 
 def named(names: Iterable[str]) -> str:
@@ -332,7 +342,7 @@ def kernel_from(options: Options) -> RadialKernel:
     """Return the apparatus function that the options describe; refuse those of none, or of two."""
     from memscal.axisymmetry.kernels import GaussianMixture, SmoothedDisc
 
-    sigmas = tuple(si(sigma, -6) for sigma in options["sigmas"])
+    sigmas = options["sigmas"]
     weights = options["weights"]
     if options["disc_radius"] is not None:
         if weights or len(sigmas) > 1:
@@ -340,7 +350,7 @@ def kernel_from(options: Options) -> RadialKernel:
                 "A disc is blurred by one Gaussian: give --disc-radius and one --sigma, and no "
                 "--weight."
             )
-        return SmoothedDisc(radius=si(options["disc_radius"], -6), sigma=sigmas[0])
+        return SmoothedDisc(radius=options["disc_radius"], sigma=sigmas[0])
     if len(weights) != len(sigmas) and (weights or len(sigmas) > 1):
         raise click.UsageError(
             f"There are {len(sigmas)} --sigma and {len(weights)} --weight: give one weight to each."

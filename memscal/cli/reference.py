@@ -25,7 +25,6 @@ from memscal.cli.options import (
     out_option,
     output_options,
     radius_options,
-    si,
 )
 from memscal.extensions import hook
 from memscal.formats.files import together
@@ -35,8 +34,8 @@ if TYPE_CHECKING:
     from memscal.mechanics.interface import Interface
     from memscal.model.indenter import Indenter
 
-#: The paper's rod and sphere, in mm.
-_RADIUS = {"rod": 0.25, "sphere": 128.8}
+#: The paper's rod and sphere, in m.
+_RADIUS = {"rod": 0.25e-3, "sphere": 128.8e-3}
 SHAPES = ("rod", "sphere", "cone", "profile")
 
 # What each shape is described by; every other of these options belongs to another shape.
@@ -96,12 +95,12 @@ def interface_of(options: Options) -> Interface:
         raise click.UsageError("Give --greenwood-tripp or --exponential: one normal law.")
     normal: GreenwoodTripp | ExponentialCompliance | None = None
     if asperities:
-        height, density, radius = map(si, asperities, (-6, 6, -6))
+        height, density, radius = asperities
         normal = GreenwoodTripp(roughness=height, asperity_density=density, asperity_radius=radius)
     if exponential:
-        decay, pressure = map(si, exponential, (-6, 6))
+        decay, pressure = exponential
         normal = ExponentialCompliance(decay_length=decay, reference_pressure=pressure)
-    return Interface(normal=normal, slip_length=si(options["slip_length"], -6))
+    return Interface(normal=normal, slip_length=options["slip_length"])
 
 
 EXAMPLES = """\b
@@ -240,7 +239,7 @@ def _pressed(indenter: str, options: Options) -> list[Contact]:
     if friction is None:
         # A film that slides is drawn out from under a rod, and is not solved to any depth.
         friction = math.inf if indenter == "rod" and not linear else 0.0
-    depths = [si(depth, -6) for depth in options["depths"]]
+    depths = list(options["depths"])
     loads = None if depths else list(options["loads"] or (1.0,))
     with out.working("Pressing"):
         return indent(
@@ -253,6 +252,6 @@ def _pressed(indenter: str, options: Options) -> list[Contact]:
             backend=options["backend"],
             rings=options["rings"],
             interface=interface_of(options),
-            film_radius=si(options["film_radius"], -3),
+            film_radius=options["film_radius"],
             strain="linear" if linear else "finite",
         )

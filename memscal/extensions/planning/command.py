@@ -29,18 +29,22 @@ from memscal.cli.options import (
 )
 from memscal.formats.files import together
 
-#: Options in other units than SI, by the power of ten.
-_IN_MM_OR_MV = (
+_AS_GIVEN = (
     "conversion_constant",
     "step",
     "half_range",
     "noise_voltage",
     "centre",
     "line_offset_uncertainty",
+    "load_uncertainty",
+    "noise",
+    "position_scale_uncertainty",
+    "load",
+    "repeats",
+    "method",
+    "rod_friction",
+    "roundness_uncertainty",
 )
-_IN_PERCENT = ("load_uncertainty", "noise", "position_scale_uncertainty")
-_SCALED = dict.fromkeys(_IN_MM_OR_MV, -3) | dict.fromkeys(_IN_PERCENT, -2)
-_AS_GIVEN = ("load", "repeats", "method", "rod_friction", "roundness_uncertainty")
 
 EXAMPLES = """\b
 Examples:
@@ -134,8 +138,6 @@ def command(
     from memscal.extensions.planning.design import design
 
     settings: dict[str, Any] = {name: options[name] for name in _AS_GIVEN}
-    for name, power in _SCALED.items():
-        settings[name] = si(options[name], power)
     settings["rod"] = indenter_from("rod", options)
     with out.working("Planning"):
         planned = design(

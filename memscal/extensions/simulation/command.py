@@ -31,7 +31,6 @@ from memscal.cli.options import (
     output_options,
     radius_options,
     rod_friction_option,
-    si,
     with_laboratory,
 )
 from memscal.cli.output import emit_json, emit_tables, message, note, prove_writable, working
@@ -99,8 +98,13 @@ _sphere_options(_SPHERE)
 _SPHERE_NAMES = [each.name for each in _SPHERE.params]
 """The options that only an experiment with a sphere has."""
 
-_PERCENT = ("noise", "baseline", "drift", "load_uncertainty", "load_scatter")
 _AS_GIVEN = (
+    "noise",
+    "baseline",
+    "drift",
+    "load_uncertainty",
+    "load_scatter",
+    "position_error",
     "state_noise",
     "state_law",
     "record_loads",
@@ -115,11 +119,8 @@ def _shared_settings(options: Options) -> dict[str, Any]:
     """Return what describes a rod scan and an experiment alike."""
     from memscal.extensions.simulation.disturbances import Disturbances
 
-    shares = {name: si(options[name], -2) for name in _PERCENT}
     disturbances = Disturbances(
-        centre=(si(options["centre"], -3), si(options["centre_y"], -3)),
-        position_error=si(options["position_error"], -6),
-        **shares,
+        centre=(options["centre"], options["centre_y"]),
         **{name: options[name] for name in _AS_GIVEN},
     )
     return {
@@ -127,7 +128,7 @@ def _shared_settings(options: Options) -> dict[str, Any]:
         "rod": indenter_from("rod", options),
         "rod_friction": options["rod_friction"],
         "kernel": kernel_from(options),
-        "conversion_constant": si(options["conversion_constant"], -3),
+        "conversion_constant": options["conversion_constant"],
         "repeats": options["repeats"],
         "disturbances": disturbances,
         "seed": options["seed"],
@@ -281,7 +282,7 @@ def command(
     with working("Simulating"):
         scan = simulate(
             load=loads[0] if len(loads) == 1 else loads,
-            half_range=si(options["half_range"], -3),
+            half_range=options["half_range"],
             points=options["points"],
             raster=options["raster"],
             **_shared_settings(options),
@@ -354,7 +355,7 @@ def _sphere(folder: Path, options: Options, as_json: bool, force: bool) -> int:
             friction=options["friction"],
             loading=options["loading"],
             points=options["contacts"],
-            spacing=si(options["spacing"], -3),
+            spacing=options["spacing"],
             **_shared_settings(options),
         )
     scans = {folder / f"{name}.h5": scan for name, scan in made.scans.items()}
