@@ -213,8 +213,12 @@ LAW = ("film_law", "mooney_rivlin_ratio")
 Defaults = Mapping[str, float | str | None]
 """Values of options that are not given, by their names without dashes."""
 
-#: The paper's film, in the units of the command line.
-PAPER_FILM: Defaults = {
+_NO_DEFAULTS: Defaults = {}
+
+#: The paper's film and rod, in the units of the command line.
+PAPER: Defaults = {
+    "radius": 0.25,
+    "radius-uncertainty": 0.0025,
     "young-modulus": 2.2,
     "poisson-ratio": 0.5,
     "thickness": 2.0,
@@ -227,7 +231,7 @@ PAPER_FILM: Defaults = {
 _UNCERTAINTY = "Standard uncertainty (k = 1) of "
 
 
-def film_options(*, defaults: Defaults | None = None, uncertainties: bool = True) -> _Adder:
+def film_options(*, defaults: Defaults = _NO_DEFAULTS, uncertainties: bool = True) -> _Adder:
     """Return the film's options, with or without those of the uncertainties."""
     ratio = NonNegative("ratio", high=0.5)
     modulus_text = "Young's modulus of the film, in MPa."
@@ -237,11 +241,10 @@ def film_options(*, defaults: Defaults | None = None, uncertainties: bool = True
         ("poisson-ratio", ratio, ratio_text, "Poisson's ratio."),
         ("thickness", Quantity("mm"), "Thickness of the film, in mm.", "the thickness, in mm."),
     )
-    values = defaults or {}
-    law = option("--film-law", click.Choice(FILM_LAWS), values.get("film-law"))
+    law = option("--film-law", click.Choice(FILM_LAWS), defaults.get("film-law"))
     constants = option("--mooney-rivlin-ratio", NonNegative("ratio"))
     return options_of(
-        _measured(entries, values, uncertainties),
+        _measured(entries, defaults, uncertainties),
         law("Law of the film's stress: small strain, or rubber."),
         constants("C2/C1 of a film of --film-law mooney-rivlin."),
     )
@@ -258,15 +261,13 @@ FREE_OR_STUCK = "Rod: 0, the film slides freely under it; inf, it sticks."
 def radius_options(
     of: str = "the rod",
     *,
-    default: float | None = None,
-    uncertainty: float | None = None,
+    defaults: Defaults = _NO_DEFAULTS,
     uncertainties: bool = True,
 ) -> _Adder:
     """Return the option of the indenter's radius, with or without its uncertainty."""
     about = f"Radius of {of} (not the diameter), in mm."
-    values = {"radius": default, "radius-uncertainty": uncertainty}
     radius = ("radius", Quantity("mm"), about, "the radius, in mm.")
-    return _measured([radius], values, uncertainties)
+    return _measured([radius], defaults, uncertainties)
 
 
 def _measured(

@@ -11,7 +11,7 @@ import click
 from memscal.cli import output as out
 from memscal.cli.options import (
     FILE,
-    PAPER_FILM,
+    PAPER,
     NonNegative,
     Options,
     Quantity,
@@ -142,7 +142,7 @@ Examples:
     "A point sticks where it first touched, or as if loaded in one step. The same under a rod."
 )
 @interface_options
-@film_options(defaults={**PAPER_FILM, "film-law": None}, uncertainties=False)
+@film_options(defaults={**PAPER, "film-law": None}, uncertainties=False)
 @option("--backend", click.Choice(["hankel", "fem"]), "hankel")(
     "Hankel transforms on an infinite film, or finite elements on one with a free edge."
 )

@@ -11,7 +11,7 @@ from memscal.cli import output as out
 from memscal.cli.failures import DONE
 from memscal.cli.options import (
     FREE_OR_STUCK,
-    PAPER_FILM,
+    PAPER,
     POSITION,
     NonNegative,
     Quantity,
@@ -80,8 +80,8 @@ def _target(value: str) -> tuple[str, float]:
 @option("--load-uncertainty", NonNegative("percent"), 1.0)(
     "Standard uncertainty (k = 1) of the load, in percent."
 )
-@radius_options(default=0.25, uncertainty=0.0025)
-@film_options(defaults=PAPER_FILM)
+@radius_options(defaults=PAPER)
+@film_options(defaults=PAPER)
 @option("--step", Quantity("mm"), 0.25)("Distance of neighbouring positions, in mm.")
 @option("--half-range", Quantity("mm"), 8.0)("Positions run from minus to plus this, in mm.")
 @option("--repeats", click.IntRange(min=1), 1)("How often the line is scanned.")

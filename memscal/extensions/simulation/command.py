@@ -15,7 +15,7 @@ from memscal.cli.failures import DONE
 from memscal.cli.options import (
     FILE,
     FREE_OR_STUCK,
-    PAPER_FILM,
+    PAPER,
     POSITION,
     NonNegative,
     Options,
@@ -222,8 +222,8 @@ Examples of an experiment: a rod scan to calibrate with, and a sphere's contacts
     "Normal load, in N. Repeated: one scan at each.  [default: 1; of a sphere's dry contacts "
     "0.34, 0.69, 1.37 and 2.75]"
 )
-@radius_options(default=0.25, uncertainty=0.0025)
-@film_options(defaults=PAPER_FILM)
+@radius_options(defaults=PAPER)
+@film_options(defaults=PAPER)
 @rod_friction_option(FREE_OR_STUCK)
 @option("--half-range", Quantity("mm"), 8.0)(
     "Rod scan alone: positions run from minus to plus this, in mm."
