@@ -5,7 +5,6 @@ from pathlib import Path
 import click
 
 from memscal.cli import output as out
-from memscal.cli.failures import DONE
 from memscal.cli.options import FILE, figure_option, option, output_options
 from memscal.formats.files import together
 
@@ -27,7 +26,7 @@ Examples:
 @output_options
 def command(
     results: Path, output: Path | None, figures: tuple[Path, ...], as_json: bool, force: bool
-) -> int:
+) -> None:
     """Summarise the results that memscal batch wrote to the folder RESULTS.
 
     Shows how A (mV/Pa) and sigma (mm) are distributed, which sensors are outliers and why (the
@@ -45,4 +44,3 @@ def command(
         out.emit_result(fleet, {"page": str(output)}, as_json=as_json)
     out.show_messages(fleet.messages)
     out.say_written([output, *figures])
-    return DONE

@@ -8,7 +8,6 @@ import click
 from click.core import ParameterSource
 
 from memscal.cli import output as out
-from memscal.cli.failures import DONE
 from memscal.cli.options import (
     FREE_OR_STUCK,
     PAPER,
@@ -120,7 +119,7 @@ def command(
     as_json: bool,
     force: bool,
     **options: Any,
-) -> int:
+) -> None:
     """Predict the uncertainties of a calibration before its scan is made.
 
     They follow, without simulation, from the Fisher information of the planned scan, the prior of
@@ -158,4 +157,3 @@ def command(
         "scan, and repeats do not show it."
     )
     out.say_written(figures)
-    return DONE

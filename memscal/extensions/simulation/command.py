@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.core import ParameterSource
 
-from memscal.cli.failures import DONE
 from memscal.cli.options import (
     FILE,
     FREE_OR_STUCK,
@@ -259,7 +258,7 @@ Examples of an experiment: a rod scan to calibrate with, and a sphere's contacts
 @output_options
 def command(
     experiment: str, output: Path | None, as_json: bool, force: bool, **options: Any
-) -> int:
+) -> None:
     """Make a synthetic scan, or the scans of an experiment, from a known apparatus function.
 
     The base stress of a rod on the bonded film, or of a sphere's contacts, is convolved with the
@@ -269,7 +268,8 @@ def command(
     """
     _check_usage(experiment, options)
     if experiment == "sphere":
-        return _sphere(output or Path("synthetic_experiment"), options, as_json, force)
+        _sphere(output or Path("synthetic_experiment"), options, as_json, force)
+        return
     output = output or Path("synthetic_scan.h5")
     laboratory = options["laboratory"]
     prove_writable([output], force=force, inputs=[laboratory])
@@ -297,7 +297,6 @@ def command(
             _print_truth({output: scan}, "scan")
     note("The scan is synthetic: nothing in it was measured.")
     message(f"Written: {output}")
-    return DONE
 
 
 def _check_usage(experiment: str, options: Options) -> None:
@@ -338,7 +337,7 @@ def _require_writable_folder(target: Path, *, overwrite: bool) -> None:
         ensure_writable(target / name, overwrite=overwrite)
 
 
-def _sphere(folder: Path, options: Options, as_json: bool, force: bool) -> int:
+def _sphere(folder: Path, options: Options, as_json: bool, force: bool) -> None:
     from memscal.extensions.simulation.experiment import simulate_experiment
     from memscal.formats.scan import write_scan
 
@@ -369,4 +368,3 @@ def _sphere(folder: Path, options: Options, as_json: bool, force: bool) -> int:
             _print_truth(scans, "experiment")
     note("The scans are synthetic: nothing in them was measured.")
     message(f"Written: {', '.join(map(str, scans))}")
-    return DONE
