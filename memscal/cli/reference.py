@@ -199,7 +199,7 @@ def command(indenter: str, as_json: bool, force: bool, **options: Any) -> None:
 
 
 def _check_usage(options: Options) -> None:
-    """Refuse options that do not go together, and choose the film's law."""
+    """Refuse options that do not go together; choose the film's law where none is given."""
     loads = options["loads"]
     depths = options["depths"]
     mesh = options["mesh"]
@@ -210,15 +210,6 @@ def _check_usage(options: Options) -> None:
             raise click.UsageError(
                 f"A file holds one load: with --{name} give one --load or one --depth."
             )
-    _choose_law(options)
-    if mesh is not None and options["backend"] != "fem" and options["film_law"] == "linear":
-        raise click.UsageError("--mesh shows finite elements: add --backend fem.")
-    if mesh is not None and mesh.suffix.lower() != ".vtu":
-        raise click.UsageError(f"{mesh} does not end in .vtu, the format of --mesh.")
-
-
-def _choose_law(options: Options) -> None:
-    """Choose the film's law by --strain where it is not given."""
     law = options["film_law"]
     strain = options["strain"]
     if strain == "linear":
@@ -227,6 +218,10 @@ def _choose_law(options: Options) -> None:
         raise click.UsageError("--film-law linear has no finite strain: leave --strain out.")
     else:
         options["film_law"] = law or ("neo-hookean" if strain else "linear")
+    if mesh is not None and options["backend"] != "fem" and options["film_law"] == "linear":
+        raise click.UsageError("--mesh shows finite elements: add --backend fem.")
+    if mesh is not None and mesh.suffix.lower() != ".vtu":
+        raise click.UsageError(f"{mesh} does not end in .vtu, the format of --mesh.")
 
 
 def _pressed(indenter: str, options: Options) -> list[Contact]:
