@@ -75,17 +75,21 @@ def emit_json(value: Mapping[str, Any]) -> None:
 
 def message(text: str) -> None:
     """Write a message to standard error."""
-    _to_stderr([text])
+    text = readable(text, sys.stderr)
+    if sys.stderr is not None and sys.stderr.isatty():
+        text = "\n  ".join(folded(text, _columns() - 2))
+    with suppress(OSError):  # standard error is closed
+        click.echo(text, err=True)
 
 
 def note(text: str) -> None:
     """Write a note, which helps to judge the result."""
-    _to_stderr([f"Note: {text}"])
+    message(f"Note: {text}")
 
 
 def warn(text: str) -> None:
     """Write a warning, which puts the result in doubt."""
-    _to_stderr([f"Warning: {text}"])
+    message(f"Warning: {text}")
 
 
 #: What messages that say the same of several things differ in.
@@ -105,18 +109,9 @@ def show_messages(messages: Iterable[Message]) -> None:
 
 def error(problem: str, why: str = "", cure: str = "") -> None:
     """Write an error: what is wrong, why that stops the work, and what to do."""
-    _to_stderr([f"Error: {problem}", *(f"  {text}" for text in (why, cure) if text)])
-
-
-def _to_stderr(lines: Sequence[str]) -> None:
-    for line in lines:
-        text = readable(line, sys.stderr)
-        if sys.stderr is not None and sys.stderr.isatty():
-            text = "\n  ".join(folded(text, _columns() - 2))
-        try:
-            click.echo(text, err=True)
-        except OSError:  # standard error is closed
-            return
+    message(f"Error: {problem}")
+    for text in filter(None, (why, cure)):
+        message(f"  {text}")
 
 
 #: Seconds until something is shown, and between two times: on a terminal, and elsewhere in lines.
