@@ -100,50 +100,20 @@ _COLUMNS = (
 )
 _OF_HOLDS = ("depth_unit", "baseline")
 _MADE = ("speed", "step")
-_LAYOUT = (
-    "x_unit",
-    "u_unit",
-    "load_unit",
-    "time_unit",
-    "u_sign",
-    "holds",
-    "ceiling",
-    "scan",
-    *_OF_HOLDS,
-    *_MADE,
-)
-_CONDITIONS = ("rod_friction", "lubrication", "lubricant", "title")
-_UNCERTAINTIES = (
-    "noise",
-    "load_uncertainty",
-    "load_scatter",
-    "position_errors_by_repeat",
-    "position_scale_uncertainty",
-    "gain_uncertainty",
-    "gain_curvature_uncertainty",
-    "roundness_uncertainty",
-    "line_offset_uncertainty",
-    "base_slip_uncertainty",
-    "baseline_curvature_uncertainty",
-    "shear_sensitivity_uncertainty",
-)
 _CELL_NAMES = {"name": "load_cell", "serial_number": "load_cell_serial"}
 _SENSOR_NAMES = {"name": "sensor_name", "model": "sensor_model", "channel": "channel"}
 _SIGNS = ("u_sign", "sign", "shear_sign")
-_ONLY = {
-    "scan": [
-        *_COLUMNS,
-        *_LAYOUT,
-        *_CONDITIONS,
-        *_UNCERTAINTIES,
-        "position_error",
-        "figure",
-        "laboratory",
-        *_SENSOR_NAMES.values(),
-        *_CELL_NAMES.values(),
-    ],
-    "reference": [*_TABLE_ONLY, *_SHARED, *_MESH_ONLY],
-}
+_OF_REFERENCE = (*_TABLE_ONLY, *_SHARED, *_MESH_ONLY)
+_OF_BOTH = (
+    "load",
+    "indenter",
+    "radius",
+    "radius_uncertainty",
+    *FILM,
+    *(f"{name}_uncertainty" for name in FILM),
+    *LAW,
+    *_READING,
+)
 _NEEDED = {"scan": ("x", "u"), "reference": ("sigma",)}
 _NEEDED_WITH_MESH = ("r_unit", "sigma_unit")
 
@@ -384,7 +354,10 @@ def _check_usage(path: Path, kind: str, mesh: bool, options: Options) -> None:
             "`memscal import --help`."
         )
     other = "reference" if kind == "scan" else "scan"
-    misplaced = _stated(options, _ONLY[other])
+    others: Iterable[str] = _OF_REFERENCE
+    if kind == "reference":
+        others = [name for name in options if name not in (*_OF_REFERENCE, *_OF_BOTH)]
+    misplaced = _stated(options, others)
     if misplaced:
         raise click.UsageError(f"{named(misplaced)} belong to --format {other}.")
     if options["value"] is not None and options["load"] is not None:
@@ -425,26 +398,13 @@ def _set_up(options: Options) -> dict[str, Any]:
 
 
 def _read_scan(path: Path, options: Options) -> ImportedScan:
-    from memscal.formats.tables.scan import import_table
-    from memscal.formats.tables.stated import ScanConditions, ScanUncertainties, TableLayout
+    from memscal.formats.tables.scan import import_table, records_of
     from memscal.model.instrument import LoadCell, StressSensor
 
     sensor = {field: options[option] for field, option in _SENSOR_NAMES.items()}
     load_cell = {field: options[option] for field, option in _CELL_NAMES.items()}
-    conditions = ScanConditions(
-        **_stated(options, ("load", *_CONDITIONS)),
-        **_set_up(options),
-        sensor=StressSensor(**_stated(sensor, _SENSOR_NAMES)),
-        load_cell=LoadCell(**_stated(load_cell, _CELL_NAMES)),
-    )
-    uncertainties = ScanUncertainties(
-        **_stated(options, _UNCERTAINTIES),
-        x_error=options["position_error"],
-    )
-    return import_table(
-        path,
-        **_stated(options, _COLUMNS),
-        layout=TableLayout(**_stated(options, (*_LAYOUT, *_READING))),
-        conditions=conditions,
-        uncertainties=uncertainties,
-    )
+    stated = _stated(options, options) | _set_up(options)
+    stated["sensor"] = StressSensor(**_stated(sensor, _SENSOR_NAMES))
+    stated["load_cell"] = LoadCell(**_stated(load_cell, _CELL_NAMES))
+    stated["x_error"] = options["position_error"]
+    return import_table(path, **_stated(options, _COLUMNS), **records_of(stated))

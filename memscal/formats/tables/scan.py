@@ -245,12 +245,18 @@ def scan_of_arrays(x: ArrayLike, u: ArrayLike, **options: Any) -> ImportedScan:
     options = {"x_unit": "m", "u_unit": "V", **options}
     if "time" in given:
         options.setdefault("time_unit", "s")
-    records: Values = {}
-    for name, record in _RECORDS.items():
-        stated = options.keys() & {item.name for item in fields(record)}
-        records[name] = record(**{field: options.pop(field) for field in stated})
+    records = records_of(options)
     named: Values = {name: name for name in table}
     return import_table(table, **named, **records, **options)
+
+
+def records_of(stated: Values) -> Values:
+    """Take the fields of layout, conditions and uncertainties from what is stated; return these."""
+    records: Values = {}
+    for name, record in _RECORDS.items():
+        own = stated.keys() & {item.name for item in fields(record)}
+        records[name] = record(**{field: stated.pop(field) for field in own})
+    return records
 
 
 def _require_use(
