@@ -92,7 +92,7 @@ _FEW_OF_RASTER = 0.003
 #: So many readings at the top, which agree within this share of the steps to the next ones, half as
 #: many, may be at a ceiling; and more that agree so many times less closely, or to so many digits.
 FEWEST_AT_CEILING = 3
-_AGREEING = 0.05
+_AGREEING = 0.07
 _AS_ALIKE = 5.0
 #: The least step of readings is of so few of their last digit, of which all are multiples, to this
 #: share of it.

@@ -32,12 +32,16 @@ def drawn(seed: int) -> tuple[int, dict[str, Any]]:
     return int(rng.integers(3, 8 if places == 20 else 10)), made
 
 
-def test_no_clipped_scan_passes_and_what_is_left_tells_a_within_its_u():
+@pytest.mark.parametrize("nine_of_20", [False, True])
+def test_no_clipped_scan_passes_and_what_is_left_tells_a_within_its_u(nine_of_20):
     silent = []
     unnamed: list[int] = []
     z = []
     for seed in range(CLIPPED):
         count, made = drawn(seed)
+        if nine_of_20:
+            count = 9
+            made["places"] = 20
         whole = wide_scan(seed, **made)
         try:
             found = memscal.calibrate(clipped(whole, count, seed=seed), other=False)
