@@ -19,6 +19,7 @@ is counted beside that, as it is for the profile (``window``).
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -28,6 +29,7 @@ from scipy.fft import fftfreq, fftshift, ifftshift, irfft2, rfft2, rfftfreq
 from memscal.calibration.fields import cosine_taper
 from memscal.calibration.stages import Deconvolution, Solution
 from memscal.calibration.uncertainty import Correlations, Effects, correlation_matrix
+from memscal.estimation.outliers import variances_nearby
 from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.voltage_map import BLOCK, square_root
 from memscal.model.arrays import (
@@ -61,6 +63,14 @@ def field_errors(
 
     fields: Any = solution.fields
     estimate = solution.estimate
+    if estimate.raster_noise:
+        # Errors of the stage make more noise where the voltage is steep; outliers count little.
+        outlier = estimate.outlier_weight
+        residual = outlier**0.5 * (estimate.points.u - estimate.predicted)
+        near = variances_nearby(estimate.points, residual)
+        near = np.where(near > 0, near, estimate.noise**2)
+        estimate = replace(estimate, weights=outlier * estimate.noise_scale**2 / near)
+        solution = replace(solution, estimate=estimate)
     g = deconvolution.g
     inputs = np.zeros((estimate.points.u.size, 0))
     if effects:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from memscal.estimation.points import ScanPoints, grouped
-from memscal.model.arrays import FloatArray, IndexArray
+from memscal.model.arrays import TINY, FloatArray, IndexArray
 from memscal.model.checks import OUTLIER_WEIGHT
 
 #: A residual beyond this many robust standard deviations is an outlier: one in 2000 by chance.
@@ -73,28 +73,42 @@ def _third_difference_noise(
     points: ScanPoints, residual: FloatArray, ordinary: IndexArray
 ) -> RasterNoise | None:
     """Noise of one reading by divided third differences along the rows of a raster."""
+    differences = _third_differences(points, ordinary)
+    count = differences.shape[0]
+    if count < _FEWEST_DIFFERENCES:
+        return None
+    square = np.sum((differences @ residual) ** 2)
+    # Differences that share readings are correlated (Satterthwaite, Biometrics Bull. 2, 1946).
+    degrees = count**2 / (differences @ differences.T).power(2).sum()
+    return RasterNoise(float(np.sqrt(square / count)), float(degrees))
+
+
+def variances_nearby(points: ScanPoints, residual: FloatArray) -> FloatArray:
+    """Variance of each reading (n,) of a raster by the differences that it has a part in."""
+    # Zero where it has a part in none.
+    differences = _third_differences(points, np.arange(residual.size))
+    shares = differences.power(2).T
+    return np.asarray(shares @ (differences @ residual) ** 2 / (shares.sum(axis=1) + TINY))
+
+
+def _third_differences(points: ScanPoints, chosen: IndexArray) -> Any:
+    """Divided third differences of neighbours among chosen readings along a row, (m, n)."""
     # sum c_i r_i / (sum c_i^2)^(1/2), 1/c_i the product of all x_i - x_j, is zero for every
     # parabola, and has the variance of the noise.
     from scipy.sparse import csr_array
 
     keys = np.stack([points.x, points.place_numbers("row"), points.repeat, points.scan])
-    order = ordinary[np.lexsort(keys[:, ordinary])]
+    order = chosen[np.lexsort(keys[:, chosen])]
     four = np.lib.stride_tricks.sliding_window_view(order, 4)
     gaps = np.diff(points.x[four], axis=1)
     together = np.all(keys[1:, four[:, :1]] == keys[1:, four], axis=(0, 2))
     four = four[together & (gaps.max(axis=1) < _UNEVEN * gaps.min(axis=1))]
-    if len(four) < _FEWEST_DIFFERENCES:
-        return None
     apart = points.x[four][:, :, None] - points.x[four][:, None, :] + np.eye(4)
     coefficients = 1 / apart.prod(axis=2)
     coefficients /= np.linalg.norm(coefficients, axis=1)[:, None]
     rows = np.repeat(np.arange(len(four)), 4)
-    shape = (len(four), residual.size)
-    differences = csr_array((coefficients.ravel(), (rows, four.ravel())), shape=shape)
-    square = np.sum((differences @ residual) ** 2)
-    # Differences that share readings are correlated (Satterthwaite, Biometrics Bull. 2, 1946).
-    degrees = len(four) ** 2 / (differences @ differences.T).power(2).sum()
-    return RasterNoise(float(np.sqrt(square / len(four))), float(degrees))
+    shape = (len(four), points.u.size)
+    return csr_array((coefficients.ravel(), (rows, four.ravel())), shape=shape)
 
 
 def isolated(points: ScanPoints, residual: FloatArray) -> FloatArray:
