@@ -117,14 +117,12 @@ def _json_value(subject: str, value: Any) -> Any:
     )
 
 
-def walk(root: Group, path: str = "") -> Iterator[tuple[str, Node]]:
+def walk(node: Node, path: str = "") -> Iterator[tuple[str, Node]]:
     """Yield every node with its path, parents first, the root as ``"/"``."""
-    yield path or "/", root
-    for name, child in root.children.items():
-        if isinstance(child, Group):
+    yield path or "/", node
+    if isinstance(node, Group):
+        for name, child in node.children.items():
             yield from walk(child, f"{path}/{name}")
-        else:
-            yield f"{path}/{name}", child
 
 
 # Path, value (None for a group) or node, and attributes.
