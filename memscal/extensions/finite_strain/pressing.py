@@ -24,8 +24,11 @@ from memscal.model.arrays import ArrayPair, FloatArray, IndexArray, array_record
 
 
 @value_record
-class RodFace:
-    """A rod (radii in mm): its end, its rounded edge, and the wall that the film drapes against."""
+class Face:
+    """A rod (radii in mm): its end, its rounded edge, and the wall that the film drapes against.
+
+    A sphere is a rod that is all rounding.
+    """
 
     radius: float
     edge: float
@@ -55,28 +58,6 @@ class RodFace:
         turning = (x > 0) & (y > 0)
         s = np.where(turning, self.flat + self.edge * np.arctan2(x, y), s)
         return s, np.where(turning, np.hypot(x, y), np.where(wall, x, y)) - self.edge
-
-
-@value_record
-class SphereFace:
-    """A sphere of this radius of curvature."""
-
-    radius: float
-
-    def contour(self, s: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return points, tangents and curvature vectors at ``s`` (mm), shapes (2, n)."""
-        sine = np.sin(s / self.radius)
-        cosine = np.cos(s / self.radius)
-        height = 2 * self.radius * np.sin(s / (2 * self.radius)) ** 2
-        points = np.stack([self.radius * sine, height])
-        return points, np.stack([cosine, sine]), np.stack([-sine, cosine]) / self.radius
-
-    def nearest(self, r: FloatArray, z: FloatArray) -> ArrayPair:
-        """Return the arc length of the nearest point, and the distance outside it."""
-        away = np.hypot(r, self.radius - z)
-        # The difference to the radius, without cancellation.
-        gap = (r**2 + z**2 - 2 * self.radius * z) / (away + self.radius)
-        return self.radius * np.arctan2(r, self.radius - z), gap
 
 
 # Newton's method has converged when the last step moved nothing by more than this share of the
@@ -129,7 +110,7 @@ class Pressing:
     """A film, an indenter, and whether the surface sticks to it."""
 
     elements: FilmElements
-    face: RodFace | SphereFace
+    face: Face
     sticking: bool
     # Whether a node sticks at its undeformed radius, and not where it came to touch the face.
     upright: bool = False
@@ -386,7 +367,7 @@ class Path:
 
     def _radius(self, goal: Target) -> float:
         """Return a rod's radius as a depth, or the load that sinks it so far; inf for a sphere."""
-        radius = self.pressing.face.radius if isinstance(self.pressing.face, RodFace) else np.inf
+        radius = self.pressing.face.radius if self.pressing.face.flat else np.inf
         modulus = self.pressing.elements.material.shear_modulus
         return radius * (8 * modulus * radius if isinstance(goal, Load) else 1.0)
 

@@ -23,12 +23,11 @@ from memscal.extensions.finite_strain.film_elements import (
     mesh_below_a_sphere,
 )
 from memscal.extensions.finite_strain.pressing import (
+    Face,
     NewtonError,
     Path,
     Pressed,
     Pressing,
-    RodFace,
-    SphereFace,
     work,
 )
 from memscal.mechanics.contact import Contact
@@ -206,10 +205,10 @@ class _Request:
         upright = isinstance(self.indenter, Sphere) and self.sticking
         return Pressing(elements, face, self.sticking, upright=upright)
 
-    def _below_rod(self, size: FilmSize) -> tuple[RodFace | SphereFace, Any]:
+    def _below_rod(self, size: FilmSize) -> tuple[Face, Any]:
         """Return the rod's face, and a mesh that is finest where its edge folds the surface."""
         rod = self.indenter.radius * _MM
-        face = RodFace(rod, _EDGE * rod if self.edge is None else self.edge * _MM)
+        face = Face(rod, _EDGE * rod if self.edge is None else self.edge * _MM)
         finest = _FINEST_SLIDING
         inner, outer = _FOLD_SLIDING
         if self.sticking:
@@ -221,11 +220,10 @@ class _Request:
             size, rod=rod, fold=fold, finest=finest * face.edge, finer=self.finer
         )
 
-    def _below_sphere(
-        self, size: FilmSize, coarse: Sequence[Contact]
-    ) -> tuple[RodFace | SphereFace, Any]:
+    def _below_sphere(self, size: FilmSize, coarse: Sequence[Contact]) -> tuple[Face, Any]:
         """Return the sphere's face, and a mesh that is fine below the contact."""
-        face = SphereFace(self.indenter.radius * _MM)
+        radius = self.indenter.radius * _MM
+        face = Face(radius, radius)
         widest = max(map(self._hertz_radius, self.goals))
         if coarse:  # now it is known
             widest = 1.1 * max(contact.contact_radius for contact in coarse) * _MM
@@ -258,7 +256,7 @@ class _Request:
         elements = pressing.elements
         nodes = elements.surface
         r = elements.nodes[0][nodes]
-        if isinstance(pressing.face, RodFace):
+        if isinstance(self.indenter, Rod):
             reach = pressing.face.flat
             depth = 0.0
         else:

@@ -10,7 +10,7 @@ from helpers.paper import FILM, ROD, SPHERE, film
 from memscal import Contact, ElasticFilm, Rod, indent
 from memscal.errors import ConvergenceError
 from memscal.extensions.finite_strain.film_elements import FilmElements, Rubber
-from memscal.extensions.finite_strain.pressing import RodFace
+from memscal.extensions.finite_strain.pressing import Face
 from memscal.extensions.finite_strain.solve import solve_finite_strain
 from memscal.mechanics.solver.step import Depth, Load
 from memscal.progress import reporting
@@ -164,7 +164,7 @@ def test_the_film_drapes_itself_around_the_rod(pressed_rods):
     r, depression, outward = deepest.inside.displacements
     moved = (r + outward) * 1e3
     above = (deepest.depth - depression) * 1e3
-    _, gap = RodFace(0.25, 0.05).nearest(moved, above)
+    _, gap = Face(0.25, 0.05).nearest(moved, above)
     assert gap.min() > -1e-9
     assert deepest.contact_radius == pytest.approx(ROD.radius, rel=0.03)
     assert np.all(deepest.traction.pressures >= 0)
