@@ -317,19 +317,10 @@ class FilmElements:
         weighted = pressures * (self.material.softness * volumes)[..., None]
         soft = against @ weighted
         whole = np.block([[stiff, couple.transpose(0, 2, 1)], [couple, soft]])
-        places, indices, starts = self._pattern
-        values = np.bincount(places, whole.ravel(), indices.size)
-        return sparse.csr_array((values, indices, starts), shape=(self.size, self.size))
-
-    @cached_property
-    def _pattern(self) -> tuple[IndexArray, IndexArray, IndexArray]:
-        """Return where an entry of the cells' matrices goes, and columns and row starts there."""
-        dofs = np.concatenate(self._shape[3:], axis=1).astype(np.int64)
-        entries = dofs[:, :, None] * self.size + dofs[:, None, :]
-        unique, places = np.unique(entries, return_inverse=True)
-        starts = np.searchsorted(unique, np.arange(self.size + 1) * self.size)
-        index = np.int32
-        return places.ravel(), (unique % self.size).astype(index), starts.astype(index)
+        dofs = np.concatenate(self._shape[3:], axis=1)
+        count = dofs.shape[1]
+        entries = (np.repeat(dofs, count, axis=1).ravel(), np.tile(dofs, count).ravel())
+        return sparse.coo_array((whole.ravel(), entries), shape=(self.size, self.size)).tocsr()
 
     def is_inside_out(self, x: FloatArray) -> bool:
         """Whether a triangle, as a whole, is turned inside out: no state of a film."""
