@@ -6,6 +6,7 @@ with the expected squares of signal plus noise in place of the data's own.
 """
 
 import math
+from bisect import bisect_left
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import field, replace
@@ -376,12 +377,7 @@ def least_design(
             raise _out_of_reach(what, targets, [d for d in tried.values() if d is not None])
         fails = works
         works = min(max(works + 1, round(_GROWTH * works)), most)
-    while works - fails > 1:
-        middle = (works + fails) // 2
-        if meets(middle):
-            works = middle
-        else:
-            fails = middle
+    works = fails + 1 + bisect_left(range(fails + 1, works), True, key=meets)
     least = tried[works]
     assert least is not None  # it meets the targets
     return least
