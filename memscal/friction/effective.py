@@ -34,7 +34,7 @@ class FrictionFit:
     """Measured loads against calculated contacts: the likelihood of each along the friction."""
 
     channel: Channel
-    shear: Channel | None
+    shear: tuple[Channel, ...]  # that of the tangential channel, where it counts too
     fine: Channel  # the channel at the values along which the likelihood is drawn
     whole: Likelihood  # of all loads, there
 
@@ -89,13 +89,8 @@ class FrictionFit:
 
     def _near(self, chosen: Sequence[int]) -> Callable[[float], Likelihood]:
         """Return the likelihood of some of the loads at any one value."""
-        channel = self.channel.only(chosen)
-        shear = None if self.shear is None else self.shear.only(chosen)
-
-        def near(value: float) -> Likelihood:
-            return likelihood(channel.at(value), None if shear is None else shear.at(value))
-
-        return near
+        channels = [channel.only(chosen) for channel in (self.channel, *self.shear)]
+        return lambda value: likelihood(*(channel.at(value) for channel in channels))
 
     def coefficient_of_maximum(self, profile: MeasuredProfile, index: int) -> BoundedEstimate:
         """Return the coefficient that explains the measured maximum of one load."""
@@ -142,7 +137,7 @@ class FrictionFit:
         return replace(estimate, least=least, budget=budget, degrees=degrees, p_value=p_value)
 
 
-def fit_friction(channel: Channel, shear: Channel | None = None) -> FrictionFit:
+def fit_friction(channel: Channel, *shear: Channel) -> FrictionFit:
     """Hold the measured loads of a channel, or of two, against calculated contacts."""
     family = channel.family
     nodes = family.coordinates
@@ -153,8 +148,7 @@ def fit_friction(channel: Channel, shear: Channel | None = None) -> FrictionFit:
     # The family's own values are kept as they are, not as their coordinates give them back.
     values = np.sort([*family.values, *between])
     fine = channel.at(values)
-    fine_shear = None if shear is None else shear.at(values)
-    return FrictionFit(channel, shear, fine, likelihood(fine, fine_shear))
+    return FrictionFit(channel, shear, fine, likelihood(fine, *(each.at(values) for each in shear)))
 
 
 def _stretch(value: float, scale: float) -> float:

@@ -15,7 +15,7 @@ import math
 from collections import Counter
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import field, replace
-from functools import cached_property
+from functools import cached_property, reduce
 from typing import Any
 
 import numpy as np
@@ -526,8 +526,7 @@ class Likelihood:
         Return log likelihood and mean chi-square, (V,), and the mean of the other loads' value.
         """
         among = np.flatnonzero(weights)
-        pairs = zip(self.statistics, held.statistics, strict=True)
-        both = Statistics(*(own[:, None] + other[among] for own, other in pairs))
+        both = added([self.statistics.at(np.s_[:, None]), held.statistics.at(among)])
         logs, chi_square = log_likelihood(both)
         weighed = logs + np.log(weights[among])
         whole = logsumexp(weighed, axis=1)
@@ -600,14 +599,16 @@ class Channel:
         """Return the channel with the contacts at some values of the family's parameter."""
         return replace(self, family=self.family.at(values))
 
+    def readings(self, load: int) -> Readings:
+        """Return the points of a load, by its index, and what is predicted there."""
+        points = self.points[load]
+        return points, predict(points, self.sensor, self.family, load)
 
-def likelihood(channel: Channel, shear: Channel | None = None) -> Likelihood:
+
+def likelihood(channel: Channel, *shear: Channel) -> Likelihood:
     """Return the likelihood of the loads of a channel, or of two, at the values of its family."""
     loads = []
-    for i, points in enumerate(channel.points):
-        readings = points, predict(points, channel.sensor, channel.family, i)
-        if shear is not None:
-            tangential = predict(shear.points[i], shear.sensor, shear.family, i)
-            readings = stacked(readings, (shear.points[i], tangential))
-        loads.append(standardise(*readings))
+    for i in range(len(channel.points)):
+        both = [each.readings(i) for each in (channel, *shear)]
+        loads.append(standardise(*reduce(stacked, both)))
     return Likelihood(channel.family.values, channel.family.coordinates, tuple(loads))

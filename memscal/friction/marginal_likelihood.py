@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import NamedTuple, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from scipy.special import logsumexp
@@ -37,6 +37,10 @@ class Statistics(NamedTuple):
     projection: FloatArray  # (..., q): D^T Q rho
     information: FloatArray  # (..., q, q): D^T Q D
     log_determinant: FloatArray  # ln det N + ln det F^T N^-1 F
+
+    def at(self, place: Any) -> Statistics:
+        """Return the statistics at some of the values, by an index of the arrays."""
+        return Statistics(*(array[place] for array in self))
 
 
 def added(several: Sequence[Statistics]) -> Statistics:
@@ -78,8 +82,7 @@ def evidence_of_each(
     logs = np.zeros(paths)
     before = np.zeros(paths)
     for step, (load, weight) in enumerate(zip(loads, weights, strict=True)):
-        pairs = zip(drawn, load, strict=True)
-        both = Statistics(*(known[:, None] + new for known, new in pairs))
+        both = added([drawn.at(np.s_[:, None]), load])
         with np.errstate(divide="ignore"):
             joint = log_likelihood(both)[0] + np.log(weight)
         expected = logsumexp(joint, axis=-1)
@@ -89,7 +92,7 @@ def evidence_of_each(
         cumulated = np.cumsum(np.exp(joint - expected[:, None]), axis=1)
         nodes = (cumulated < draws[:, step, None] * cumulated[:, -1:]).sum(axis=1)
         nodes = np.minimum(nodes, weight.size - 1)
-        drawn = Statistics(*(array[np.arange(paths), nodes] for array in both))
+        drawn = both.at((np.arange(paths), nodes))
         before = log_likelihood(drawn)[0]
     mean = float(logsumexp(logs)) - math.log(paths)
     return mean, float(np.std(np.exp(logs - mean)) / np.sqrt(paths))

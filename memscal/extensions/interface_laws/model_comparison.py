@@ -296,7 +296,7 @@ def one_of_each(name: str, curves: Sequence[LawCurve], prior: Prior, degrees: in
     loads = []
     weights = []
     for along in curves:
-        loads.append(Statistics(*(array[along.near] for array in along.statistics)))
+        loads.append(along.statistics.at(along.near))
         weights.append(np.diff(prior(along.edges))[along.near])
     log_evidence, error = evidence_of_each(loads, weights)
     chosen, top, chi_square = _best_of_each(loads)
@@ -322,8 +322,7 @@ def _best_of_each(loads: Sequence[Statistics]) -> tuple[list[int], float, float]
             several = [load]
             for i, other in enumerate(loads):
                 if i != j:
-                    node = chosen[i]
-                    several.append(Statistics(*(array[node] for array in other)))
+                    several.append(other.at(chosen[i]))
             logs, chi_square = log_likelihood(added(several))
             chosen[j] = int(np.argmax(logs))
             top = float(logs[chosen[j]])
