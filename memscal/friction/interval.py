@@ -1,7 +1,6 @@
 """The interval of a friction coefficient, or of a length, by its profile likelihood."""
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 from scipy.special import chdtri
@@ -42,12 +41,11 @@ def profile_estimate(
     def interval_of(level: float) -> Interval:
         """Values whose -2 ln p is no larger than the level allows."""
         top = lowest + float(chdtri(1, 1 - level))
-        inside = np.append(coordinates[deviance <= top], best)
-        low = _crossing(spline, coordinates, float(inside.min()), -1, top)
-        high = _crossing(spline, coordinates, float(inside.max()), 1, top)
-        lower = 0.0 if low is None else float(unbounded(low, scale))
-        upper = None if high is None else float(unbounded(high, scale))
-        return Interval(lower, upper, level)
+        crossings = unbounded(spline.solve(top, extrapolate=False), scale)
+        # An end that the level allows is beyond what was calculated.
+        low = 0.0 if deviance[0] <= top else float(crossings.min())
+        high = None if deviance[-1] <= top else float(crossings.max())
+        return Interval(low, high, level)
 
     interval = interval_of(_LEVEL)
     value = None
@@ -63,21 +61,6 @@ def profile_estimate(
     return BoundedEstimate(
         value, spread, interval, reason(interval), values, above, least, unit=unit
     )
-
-
-def _crossing(
-    spline: Any, coordinates: FloatArray, start: float, side: int, level: float
-) -> float | None:
-    """Where the spline rises through a level next to an inside point; None beyond the ends."""
-    beyond = coordinates[coordinates * side > start * side]
-    if not beyond.size:
-        return None
-    outside = float(beyond.min() if side > 0 else beyond.max())
-    if spline(outside) <= level:
-        return None
-    roots = spline.solve(level, extrapolate=False)
-    between = roots[(min(start, outside) <= roots) & (roots <= max(start, outside))]
-    return float(min(between, key=lambda root: abs(root - start), default=start))
 
 
 def friction_reason(interval: Interval, last: float) -> str:

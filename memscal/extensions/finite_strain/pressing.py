@@ -241,7 +241,7 @@ class Pressing:
         free[self._free(state)] = solution
         moved = max(np.max(np.abs(free[: 2 * n])), abs(sunk))
         for share in _SHARES:
-            place = state.place if self.sticking else state.place + share * free[touching]
+            place = state.place + share * free[touching]
             x = state.x + share * free
             depth = state.depth + share * sunk
             ahead = self.placed(replace(state, x=x, depth=depth, place=place))
@@ -259,16 +259,16 @@ class Pressing:
 
     def _change(self, state: Pressed) -> Any:
         """Return the change of all unknowns with those that are free, sparse."""
-        # The places of sliding nodes are in the columns of their radial displacement.
+        # The places of touching nodes are in the columns of their radial displacement, which is
+        # free where they slide.
         size = self.elements.size
         touching = state.touching
         change = sparse.eye_array(size, format="csc")
-        if not self.sticking:
-            _, tangents, _ = self.face.contour(state.place)
-            rows = np.append(touching, touching + self.elements.n)
-            values = np.append(tangents[0] - 1, tangents[1])
-            sliding = (values, (rows, np.append(touching, touching)))
-            change = change + sparse.coo_array(sliding, shape=(size, size)).tocsc()
+        _, tangents, _ = self.face.contour(state.place)
+        rows = np.append(touching, touching + self.elements.n)
+        values = np.append(tangents[0] - 1, tangents[1])
+        sliding = (values, (rows, np.append(touching, touching)))
+        change = change + sparse.coo_array(sliding, shape=(size, size)).tocsc()
         return change[:, self._free(state)]
 
     def _tangent(self, state: Pressed, forces: FloatArray, change: Any) -> _Tangent:
@@ -277,13 +277,10 @@ class Pressing:
         n = self.elements.n
         stiffness = self.elements.tangent(state.x)
         free = self._free(state)
-        if self.sticking:
-            reduced = stiffness[free][:, free]
-        else:
-            _, _, bends = self.face.contour(state.place)
-            curvature = np.zeros(forces.size)
-            curvature[touching] = forces[touching] * bends[0] + forces[touching + n] * bends[1]
-            reduced = change.T @ stiffness @ change + sparse.diags_array(curvature[free])
+        _, _, bends = self.face.contour(state.place)
+        curvature = np.zeros(forces.size)
+        curvature[touching] = forces[touching] * bends[0] + forces[touching + n] * bends[1]
+        reduced = change.T @ stiffness @ change + sparse.diags_array(curvature[free])
         # The matrix is symmetric, and needs pivots off the diagonal only for the pressures.
         factors = splu(reduced.tocsc(), diag_pivot_thresh=1e-4)
         # The depth moves all touching nodes down.
