@@ -160,7 +160,7 @@ def comparison_figure(
         return figures[name]()
     if comparison.by_shear:
         raise InputError("There is no figure of a comparison by the shear alone.")
-    loads = chosen(comparison, loading, lubrication)
+    loads = chosen(comparison, lubrication, loading)
     with panels_of(5.6, 2, 2, note=_BOTH_NOTE) as (figure, panels):
         (profiles, maxima), (residuals, effective) = panels
         draw_profiles(profiles, comparison, loads)
@@ -182,11 +182,11 @@ def comparison_figures(comparison: FrictionComparison) -> Mapping[str, Callable[
         return figures
     for state in dict.fromkeys(profile.lubrication for profile in comparison.measured.profiles):
         tail = f"-{state}" if state else ""
-        figures[f"profiles{tail}"] = partial(profile_figure, comparison, lubrication=state)
-        figures[f"friction-set{tail}"] = partial(friction_set_figure, comparison, lubrication=state)
+        figures[f"profiles{tail}"] = partial(profile_figure, comparison, state)
+        figures[f"friction-set{tail}"] = partial(friction_set_figure, comparison, state)
     figures["maxima"] = partial(maxima_figure, comparison)
-    figures["effective-friction"] = partial(effective_friction_figure, comparison)
-    figures["likelihood"] = partial(likelihood_figure, comparison)
+    figures["effective-friction"] = partial(_panels, comparison, _draw_effective, 2.7, _BOTH_NOTE)
+    figures["likelihood"] = partial(_panels, comparison, _draw_likelihood, 2.4, INTERVAL_NOTE)
     if comparison.interface is not None:
         figures["interface"] = partial(hook("interface_figure"), comparison)
     return figures
@@ -201,11 +201,6 @@ _ASIDE = 0.008
 #: Differences of chi-square that bound 68.3 % and 95 % of one parameter.
 _LEVELS = ((1.0, "68 %"), (3.84, "95 %"))
 _HIGHEST = 12.0
-
-
-def effective_friction_figure(comparison: FrictionComparison) -> Figure:
-    """Draw the effective friction coefficient against the load, with intervals."""
-    return _panels(comparison, _draw_effective, 2.7, _BOTH_NOTE)
 
 
 def _draw_effective(axes: Axes, comparison: FrictionComparison, loads: Loads) -> None:
@@ -277,7 +272,7 @@ def _panels(
     ) as (figure, panels):
         for row, lubrication in zip(panels, lubrications, strict=True):
             for axes, loading in zip(row, comparison.loadings, strict=True):
-                draw(axes, comparison, chosen(comparison, loading, lubrication))
+                draw(axes, comparison, chosen(comparison, lubrication, loading))
                 words = lubricated_words(lubrication) + (f", {loading} loading" if loading else "")
                 axes.set_title(words, fontsize=8, loc="left")
                 axes.label_outer()
@@ -298,12 +293,8 @@ def _one_legend(figure: Figure, panels: Iterable[Axes], first: Sequence[str]) ->
     figure.legend(handles, order, loc="outside upper center", ncols=min(len(order), 7))
 
 
-def likelihood_figure(comparison: FrictionComparison) -> Figure:
-    """Draw chi-square above its least value against the coefficient: the profile likelihoods."""
-    return _panels(comparison, _draw_likelihood, 2.4, INTERVAL_NOTE)
-
-
 def _draw_likelihood(axes: Axes, comparison: FrictionComparison, loads: Loads) -> None:
+    """Draw chi-square above its least value against the coefficient: the profile likelihoods."""
     looks = comparison_looks(comparison)
     for at_load in loads:
         colour, name = looks[at_load.load]

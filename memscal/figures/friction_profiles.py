@@ -69,7 +69,7 @@ def lubricated_words(lubrication: str) -> str:
 
 
 def chosen(
-    comparison: FrictionComparison, loading: str | None, lubrication: str | None
+    comparison: FrictionComparison, lubrication: str | None, loading: str | None = None
 ) -> list[LoadComparison]:
     """Return the loads of one loading and lubrication, increasing; of the first by default."""
     loading = comparison.loadings[0] if loading is None else loading
@@ -149,11 +149,9 @@ _SHOWN = (0.05, 0.1, 0.2, 0.3)
 _MOST_LOADS = 4
 
 
-def profile_figure(
-    comparison: FrictionComparison, *, lubrication: str | None = None, loading: str | None = None
-) -> Figure:
+def profile_figure(comparison: FrictionComparison, lubrication: str) -> Figure:
     """Draw measured profiles between no friction and full stick, as Figure 3 of the paper."""
-    loads = chosen(comparison, loading, lubrication)
+    loads = chosen(comparison, lubrication)
     with panels_of(4.6, 2, 2, height_ratios=(2.2, 1), sharex=True) as (figure, panels):
         draw_profiles(panels[0, 0], comparison, loads)
         draw_profiles(panels[0, 1], comparison, loads, logarithmic=True)
@@ -255,11 +253,9 @@ def _draw_residuals(
     return float(np.abs(z).max())
 
 
-def friction_set_figure(
-    comparison: FrictionComparison, *, lubrication: str | None = None, loading: str | None = None
-) -> Figure:
+def friction_set_figure(comparison: FrictionComparison, lubrication: str) -> Figure:
     """Draw profiles beside those of a set of friction coefficients, as Figure 4 of the paper."""
-    loads = chosen(comparison, loading, lubrication)
+    loads = chosen(comparison, lubrication)
     shown = np.linspace(0, len(loads) - 1, min(len(loads), _MOST_LOADS)).round().astype(int)
     loads = [loads[i] for i in np.unique(shown)]
     heights = (1.5, 1.5, 1.0)

@@ -431,9 +431,9 @@ class Standardised:
     log_determinant: FloatArray  # (V,): of N and of the flat information
     degrees: int
 
-    def with_lubricated_friction(self, column: FloatArray) -> Standardised:
-        """Return the load with one systematic column (V, n, 1) more."""
-        columns = np.concatenate([self.columns, column], axis=-1)
+    def with_lubricated_friction(self, spread: float) -> Standardised:
+        """Return the load with one systematic column more, for a ``spread`` of its coordinate."""
+        columns = np.concatenate([self.columns, spread * self.slope[..., None]], axis=-1)
         return replace(self, columns=columns, widths={**self.widths, LUBRICATED_FRICTION: 1})
 
     @cached_property
@@ -509,13 +509,10 @@ class Likelihood:
 
         ``spread`` is the standard uncertainty of that value, in the bounded coordinate.
         """
-        loads = []
-        for load in self.loads:
-            unmoved = np.zeros((*load.slope.shape, 1))
-            loads.append(load.with_lubricated_friction(unmoved))
+        loads = [load.with_lubricated_friction(0.0) for load in self.loads]
         for load in held.loads:
-            still = replace(load, slope=np.zeros_like(load.slope))
-            loads.append(still.with_lubricated_friction(spread * load.slope[..., None]))
+            moved = load.with_lubricated_friction(spread)
+            loads.append(replace(moved, slope=np.zeros_like(load.slope)))
         return replace(self, loads=tuple(loads))
 
     def averaged_over(

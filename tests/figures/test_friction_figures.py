@@ -9,8 +9,7 @@ from matplotlib.axes import Axes
 
 from memscal.errors import InputError
 from memscal.extensions.interface_laws.figure import interface_figure
-from memscal.figures import friction as of_friction
-from memscal.figures.friction import effective_friction_figure, likelihood_figure
+from memscal.figures.friction import comparison_figure, maxima_figure
 from memscal.figures.friction_profiles import (
     friction_position,
     friction_set_figure,
@@ -45,7 +44,7 @@ def test_profiles_are_drawn_with_their_expanded_uncertainties(found):
 
 
 def test_curves_are_of_the_fitted_coefficient_and_of_the_limits(found):
-    axes = of_friction.comparison_figure(found).axes[0]
+    axes = comparison_figure(found).axes[0]
     best = found.joint["dry"]["incremental"].value
     for ls, friction in (("-", best), (":", 0.0), ("--", math.inf)):
         lines = [
@@ -60,7 +59,7 @@ def test_curves_are_of_the_fitted_coefficient_and_of_the_limits(found):
 
 
 def test_ratios_stand_at_their_loads_among_the_calculated_curves(found):
-    figure = of_friction.maxima_figure(found)
+    figure = maxima_figure(found)
     assert len(figure.axes) == len(found.loadings)
     for axes, loads in zip(figure.axes, found.loads.values(), strict=True):
         dry, lubricated = bars(axes)
@@ -77,7 +76,7 @@ def test_ratios_stand_at_their_loads_among_the_calculated_curves(found):
 
 def test_an_open_interval_is_an_arrow_to_infinity_without_a_value():
     sticking = comparison(friction=math.inf, lubrications=("dry",), loadings=("incremental",))
-    (axes,) = effective_friction_figure(sticking).axes
+    (axes,) = comparison_figure(sticking, name="effective-friction").axes
     open_ends = [line for line in axes.lines if line.get_label() == "_open"]
     of_profile = [one.by_profile for one in sticking.loads["incremental"]]
     assert all(reading.interval.high is None for reading in of_profile)
@@ -87,7 +86,7 @@ def test_an_open_interval_is_an_arrow_to_infinity_without_a_value():
 
 
 def test_likelihoods_touch_zero_at_the_best_coefficient(found):
-    axes = likelihood_figure(found).axes[0]
+    axes = comparison_figure(found, name="likelihood").axes[0]
     curves = {line.get_label(): line for line in axes.lines}
     one = found.loads["incremental"][0]
     joint = found.joint["dry"]["incremental"]
@@ -107,7 +106,7 @@ def test_the_likelihood_of_a_slip_length_touches_zero_at_it():
 
 def test_what_was_not_measured_or_compared_is_refused_by_name(found):
     with pytest.raises(InputError, match="sideways"):
-        profile_figure(found, loading="sideways")
+        comparison_figure(found, loading="sideways")
     with pytest.raises(InputError, match="not stated"):
         friction_set_figure(found, lubrication="")
     with pytest.raises(InputError, match="interface=True"):

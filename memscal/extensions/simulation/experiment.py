@@ -22,7 +22,7 @@ from memscal.extensions.simulation.disturbances import (
 )
 from memscal.extensions.simulation.rod_scan import PAPER_FILM, PAPER_ROD, simulate, without_law
 from memscal.mechanics.interface import Interface
-from memscal.model.arrays import array_record, keyword_value_record, require_non_negative
+from memscal.model.arrays import Values, array_record, keyword_value_record, require_non_negative
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Rod, Sphere
 from memscal.model.instrument import LoadCell
@@ -47,31 +47,26 @@ def drawn(
     """Draw the true values from the stated ones, normal and independent, by their uncertainties."""
     rng = np.random.default_rng(seed)
 
-    def around(value: float, uncertainty: float | None) -> float:
-        # Drawn in any case: a source that is not stated moves no other.
-        return value + (uncertainty or 0.0) * rng.standard_normal()
+    def around(record: object, *names: str) -> Values:
+        values = {}
+        for name in names:
+            # Drawn in any case: a source that is not stated moves no other.
+            u = getattr(record, f"{name}_uncertainty") or 0.0
+            values[name] = getattr(record, name) + u * rng.standard_normal()
+        return values
 
-    film = stated.film
-    modulus = around(film.young_modulus, film.young_modulus_uncertainty)
+    film = around(stated.film, "young_modulus", "poisson_ratio", "thickness")
     # A Poisson's ratio above 0.5 is reflected at 0.5.
-    ratio = 0.5 - abs(0.5 - around(film.poisson_ratio, film.poisson_ratio_uncertainty))
-    thickness = around(film.thickness, film.thickness_uncertainty)
-    true_film = replace(
-        film,
-        young_modulus=modulus,
-        poisson_ratio=ratio,
-        thickness=thickness,
-        poisson_ratio_uncertainty=None,
-    )
-    rod_radius = around(stated.rod.radius, stated.rod.radius_uncertainty)
-    sphere_radius = around(stated.sphere.radius, stated.sphere.radius_uncertainty)
-    rod_load_scale = around(1.0, load_uncertainty)
+    film["poisson_ratio"] = 0.5 - abs(0.5 - film["poisson_ratio"])
+    rod = replace(stated.rod, **around(stated.rod, "radius"))
+    sphere = replace(stated.sphere, **around(stated.sphere, "radius"))
+    rod_load, load = (1.0 + load_uncertainty * rng.standard_normal() for _ in range(2))
     return Reality(
-        film=true_film,
-        rod=replace(stated.rod, radius=rod_radius),
-        sphere=replace(stated.sphere, radius=sphere_radius),
-        rod_load_scale=rod_load_scale,
-        load_scale=rod_load_scale if one_load_cell else around(1.0, load_uncertainty),
+        film=replace(stated.film, **film, poisson_ratio_uncertainty=None),
+        rod=rod,
+        sphere=sphere,
+        rod_load_scale=rod_load,
+        load_scale=rod_load if one_load_cell else load,
     )
 
 
@@ -225,7 +220,14 @@ def simulate_experiment(
     truth = {"conversion_constant": conversion_constant, "gain": gain, "seed": float(seed)}
     if shear is not None:
         truth["conversion_constant_xz"] = shear[1]
-    rod_truth = {**_rod_truth(true, rod_load), **truth, "gain": 1.0}
+    rod_truth = {
+        **described_film(true.film),
+        "indenter_radius": true.rod.radius,
+        "load_scale": true.rod_load_scale,
+        "load_1": true.rod_load_scale * rod_load,
+        **truth,
+        "gain": 1.0,
+    }
     nominal = replace(calibration, load=rod_load)
     if disturbances.load_uncertainty is not None:
         nominal = replace(nominal, load_uncertainty=disturbances.load_uncertainty * rod_load)
@@ -236,16 +238,6 @@ def simulate_experiment(
         dry=_as_stated(dry, truth, indenter=sphere, **stated),
         lubricated=_as_stated(lubricated, truth, indenter=sphere, **stated),
     )
-
-
-def _rod_truth(true: Reality, rod_load: float) -> dict[str, float]:
-    """Return what was pressed in the rod scan, by the names of a truth."""
-    return {
-        **described_film(true.film),
-        "indenter_radius": true.rod.radius,
-        "load_scale": true.rod_load_scale,
-        "load_1": true.rod_load_scale * rod_load,
-    }
 
 
 def _true(stated: Reality, disturbances: Disturbances, seed: int) -> Reality:
