@@ -148,7 +148,7 @@ def _peak(radial: ApparatusRadial) -> float:
 
 
 def _largest(values: FloatArray, floor: float = 1e-300) -> float:
-    return float(np.max(values, initial=floor, where=np.isfinite(values)))
+    return np.max(values, initial=floor, where=np.isfinite(values))
 
 
 _RESIDUALS = (-3.5, 3.5)

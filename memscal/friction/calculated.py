@@ -34,7 +34,7 @@ def amontons_family(
     values = parameter_values("friction coefficients", friction)
     if loading not in ("incremental", "total"):
         raise InputError(f'loading is {loading!r}, but it is "incremental" or "total".')
-    paths = [setup.path(friction=float(mu), loading=loading) for mu in values]
+    paths = [setup.path(friction=mu, loading=loading) for mu in values]
     return setup.family(paths, name="amontons", loading=loading, values=values)
 
 
@@ -161,7 +161,7 @@ def _checked_friction(profile: StressProfile, reach: float) -> float:
             cure="State it when the table is imported (--friction).",
         )
     size = np.abs(profile.sigma_zz)
-    tail = float(size[-1] / size.max())
+    tail = size[-1] / size.max()
     if profile.r[-1] < reach and tail > _DECAYED:
         end = profile.r[-1] * 1e3
         raise InputError(
@@ -176,7 +176,7 @@ def _checked_friction(profile: StressProfile, reach: float) -> float:
             why="The force that the base carries must be the load.",
             cure="Check the load, the units, and that the table is fine enough.",
         )
-    return float(profile.friction_coefficient)
+    return profile.friction_coefficient
 
 
 def _name(profile: StressProfile) -> str:

@@ -116,7 +116,7 @@ def comparison_messages(
         *_against_macroscopic(joint, macroscopic),
     ]
     for loading, family in families.items():
-        worst = float(np.nanmax(family.convergence, initial=0.0))
+        worst = np.nanmax(family.convergence, initial=0.0)
         if worst > _COARSE:
             words = f" ({loading} loading)" if loading else ""
             text = f"contacts{words} have converged to {worst:.1%} of their stress only."

@@ -452,11 +452,11 @@ def channels_of(
 ) -> dict[str, Channel]:
     """Return what one channel measured with the contacts of each family, by its loading."""
     points = points_of(measured.profiles, apparatus.sensor.channel, between_scan_gain)
-    reach = max(float(readings.radius.max()) for readings in points)
+    reach = max(readings.radius.max() for readings in points)
     channels = {}
     for loading, family in families.items():
         sensor = sensor_of(apparatus, family, reach, measured.scans, common)
-        nearest = [int(np.abs(family.loads - load).argmin()) for load in measured.loads]
+        nearest = [np.abs(family.loads - load).argmin() for load in measured.loads]
         channels[loading] = Channel(points, sensor, family.only(nearest))
     return channels
 

@@ -95,7 +95,7 @@ def dry_against_lubricated(
     # What each scan has for itself, its gain and load, on the axis as nearest to it.
     own = np.concatenate([columns["between_scan_gain"], columns["load"]], axis=-1)[0]
     by_scan = np.linalg.norm(own, axis=1) / sensor.conversion_constant
-    on_axis = float(by_scan[np.argmin(dry.radius)])
+    on_axis = by_scan[np.argmin(dry.radius)]
     maximum_uncertainty = math.hypot(
         conversion_share * maximum, on_axis, *map(random_uncertainty, budgets)
     )
@@ -154,7 +154,7 @@ def _common_places(dry: FloatArray, lubricated: FloatArray) -> tuple[IndexArray,
     """Return the indices of places that both scans measured, a quarter of a step apart at most."""
     middles = (lubricated[1:] + lubricated[:-1]) / 2
     nearest = np.searchsorted(middles, dry)
-    step = float(np.median(np.diff(dry))) if dry.size > 1 else 0.0
+    step = np.median(np.diff(dry)) if dry.size > 1 else 0.0
     close = np.flatnonzero(np.abs(dry - lubricated[nearest]) < _CLOSE * step)
     matched, first = np.unique(nearest[close], return_index=True)
     return close[first], matched

@@ -80,7 +80,7 @@ class FrictionFit:
         return replace(
             estimate,
             interval=interval,
-            reason=friction_reason(interval, float(family.values[-1])),
+            reason=friction_reason(interval, family.values[-1]),
             beside=len(lubricated),
             # More friction of the lubricated loads reads as less of the others.
             by_lubricated=None if share is None else -share / spread,
@@ -112,7 +112,7 @@ class FrictionFit:
     ) -> BoundedEstimate:
         """Return the best coefficient with its interval; its budget by the slope at its value."""
         family = self.channel.family
-        last = float(family.values[-1])
+        last = family.values[-1]
         estimate = profile_estimate(
             along.values,
             along.coordinates,
@@ -229,7 +229,7 @@ def load_comparison(profile: MeasuredProfile, fit: FrictionFit, index: int) -> L
     # Measured over calculated maximum: A and G err together.
     on_axis = predict(points_at(np.zeros(1), points), sensor, family, index)
     changes = np.concatenate([column[0, 0] for column in on_axis.columns.values()])
-    systematic = float(np.linalg.norm(changes)) / float(on_axis.signal[0, 0])
+    systematic = np.linalg.norm(changes) / on_axis.signal[0, 0]
     random = random_uncertainty(profile.maximum_budget) / profile.maximum
     ratio = profile.maximum / float(maxima[0])
     # The family's own values are among the fine ones.

@@ -293,7 +293,7 @@ class FamilySetup:
 
     def path(self, **law: Any) -> LoadingPath:
         """Return the loading path of one member; ``law``: its friction, loading and interface."""
-        law |= {"loads": tuple(float(load) for load in self.loads), "order": self.order}
+        law |= {"loads": tuple(self.loads.tolist()), "order": self.order}
         return LoadingPath(film=self.film, indenter=self.indenter, **law)
 
     def family(
@@ -410,7 +410,7 @@ def require_loads(loads: ArrayLike) -> FloatArray:
     """Return loads (N) as an array; refuse none, and what is not finite and positive."""
     checked = finite_vector("loads", np.atleast_1d(loads))
     for load in checked:
-        require_positive("load", float(load), "N")
+        require_positive("load", load, "N")
     return checked
 
 

@@ -31,11 +31,11 @@ def profile_estimate(
 
     spline = CubicSpline(coordinates, deviance)
     # The lowest point of the spline next to the lowest node.
-    i = int(np.argmin(deviance))
+    i = np.argmin(deviance)
     around = coordinates[max(i - 1, 0) : i + 2]
     turns = spline.derivative().roots(extrapolate=False)
     turns = turns[(around[0] < turns) & (turns < around[-1])]
-    best = float(min([coordinates[i], *turns], key=spline))
+    best = min([coordinates[i], *turns], key=spline)
     lowest = float(spline(best))
 
     def interval_of(level: float) -> Interval:

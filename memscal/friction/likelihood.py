@@ -135,7 +135,7 @@ def load_points(profile: MeasuredProfile, channel: str = "zz") -> LoadPoints:
         places = _own(np.round(position, 12).tolist())
     return LoadPoints(
         u=points.u,
-        offset=position - float(profile.centre[profile.axis]),
+        offset=position - profile.centre[profile.axis],
         log_load=np.log(points.load / profile.load),
         # A stated noise is not raised by a misfit: chi-square would not show it then.
         noise=points.noise / np.sqrt(points.weight),
@@ -415,7 +415,7 @@ class Noise:
         for name, kind in self.kinds.items():
             share = weights * kind[0].reshape(weights.shape)
             correlation = self.shared.get(name, np.eye(weights.shape[1]))
-            shares[name] = float(np.sqrt(np.sum(share @ correlation * share)))
+            shares[name] = np.sqrt(np.sum(share @ correlation * share))
         return shares
 
 

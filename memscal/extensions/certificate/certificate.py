@@ -99,7 +99,7 @@ class Conformity:
         low = self.lower - self.certified.value
         high = self.upper - self.certified.value
         u = self.certified.uncertainty
-        return float(ndtr(high / u) - ndtr(low / u)) if u > 0 else float(low <= 0 <= high)
+        return ndtr(high / u) - ndtr(low / u) if u > 0 else float(low <= 0 <= high)
 
 
 class CertifiedProfile(NamedTuple):

@@ -45,7 +45,7 @@ def error_classes(fleet: FleetResults) -> Counts:
 
 
 def _limit(fleet: FleetResults) -> float:
-    return robust_limit(int(np.isfinite(fleet.conversion_constant).sum()))
+    return robust_limit(np.isfinite(fleet.conversion_constant).sum())
 
 
 def outliers(fleet: FleetResults) -> dict[int, str]:

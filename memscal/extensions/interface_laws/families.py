@@ -52,7 +52,7 @@ def elasto_plastic_family(
         if math.isinf(length):
             paths.append(setup.path(friction=0.0))
         else:
-            interface = Interface(slip_length=float(length))
+            interface = Interface(slip_length=length)
             paths.append(setup.path(friction=float(friction), interface=interface))
     return setup.family(
         paths,
@@ -86,7 +86,7 @@ def normal_compliance_family(
         interface = Interface()
         if length > 0:
             meeting = _MEETING * film.contact_modulus
-            normal = ExponentialCompliance(decay_length=float(length), reference_pressure=meeting)
+            normal = ExponentialCompliance(decay_length=length, reference_pressure=meeting)
             interface = Interface(normal=normal)
         paths.append(setup.path(friction=0.0, interface=interface))
     note = (

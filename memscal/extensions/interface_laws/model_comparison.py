@@ -159,7 +159,7 @@ def compare_interface(
     contacts: Values = {
         "film": scan.film,
         "indenter": scan.indenter,
-        "reach": _REACH * max(float(profile.r[-1]) for profile in profiles),
+        "reach": _REACH * max(profile.r[-1] for profile in profiles),
         "cache": cache,
         "workers": workers,
     }
@@ -371,7 +371,7 @@ def _read(values: FloatArray, curve: FloatArray, top: float) -> float:
     if top >= curve.max() * (1 - _STICK):
         return math.inf
     finite = np.isfinite(values)
-    return float(np.interp(top, np.maximum.accumulate(curve[finite]), values[finite]))
+    return np.interp(top, np.maximum.accumulate(curve[finite]), values[finite])
 
 
 #: Intervals of a length are wider by this factor: contacts are linearised about the stated film.

@@ -171,7 +171,7 @@ class DrawnScans:
             value = np.clip(item.value + item.u * standard[item.source], *item.bounds)
             for i in item.scans:
                 owner = getattr(scans[i], item.component)
-                owner = replace(owner, **{item.attribute: float(value)})
+                owner = replace(owner, **{item.attribute: value})
                 scans[i] = replace(scans[i], **{item.component: owner})
         references = self.solution.estimate.model.references
         changes = []

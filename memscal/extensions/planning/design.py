@@ -188,7 +188,7 @@ def expected_calibration(plan: Plan, method: Method) -> tuple[Solution, Results]
     fit = fit_gaussian_to_points(model, weights, start=fit_gaussian_to_points(model, weights))
     reduced = ReducedScan.of(model, fit, weights)
     basis = departure_basis(fit, reduced)
-    count = float(plan.repeats * weights.size)
+    count = plan.repeats * weights.size
     weighed = weigh_departures(reduced, basis, count, expected_noise=1.0).average()
     ones = np.ones_like(weights)
     estimate = ProfileEstimate(model, fit, *supported(basis, weighed), weights, ones, basis)

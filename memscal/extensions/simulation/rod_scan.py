@@ -131,7 +131,7 @@ def simulate(
     # The stress in a linear film is proportional to the load: one contact serves for all.
     solved = loads.max(keepdims=True) if linear else loads
     true = film.expected
-    contacts = [press_rod(true, rod, float(value), rod_friction) for value in solved]
+    contacts = [press_rod(true, rod, value, rod_friction) for value in solved]
 
     x = np.linspace(-half_range, half_range, points)
     offset = x - disturbances.centre[0]

@@ -45,7 +45,7 @@ def checked_loads(load: float | Sequence[float]) -> FloatArray:
     if loads.ndim != 1 or loads.size == 0:
         raise InputError("The list of loads is empty.", cure="Give one load or several, in N.")
     for value in loads:
-        require_positive("load", float(value), "N")
+        require_positive("load", value, "N")
     return loads
 
 
