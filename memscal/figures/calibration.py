@@ -24,9 +24,15 @@ from memscal.figures.calibration_scan import (
 )
 from memscal.figures.style import (
     ALONG_RADIUS,
-    COLOURS,
+    DECONVOLVED,
     EXPANDED,
+    FAILED,
     FIGURE_WIDTH,
+    GAUSSIAN,
+    MEASURED,
+    MUTED,
+    REFERENCE,
+    WINDOW,
     channel_indices,
     draw_band,
     drawable,
@@ -99,12 +105,12 @@ def draw_transfer(axes: Axes, data: ApparatusData) -> None:
     samples = np.stack([transfer.modulus, EXPANDED * transfer.modulus_errors, transfer.window])
     modulus, band, window = on_axis(transfer.k, samples, k * PER_MM)
     draw_band(axes, k, np.maximum(modulus - band, 0.0), modulus + band, _BAND)
-    axes.plot(k, np.maximum(modulus, 0.0), color=COLOURS["deconvolved"], label="modulus for G")
+    axes.plot(k, np.maximum(modulus, 0.0), color=DECONVOLVED, label="modulus for G")
     gaussian = gaussian_transfer(k * PER_MM, data.gaussian_sigma)
-    axes.plot(k, gaussian, "--", color=COLOURS["gaussian"], label="Gaussian")
-    axes.plot(k, window, ":", color=COLOURS["window"], label="window")
+    axes.plot(k, gaussian, "--", color=GAUSSIAN, label="Gaussian")
+    axes.plot(k, window, ":", color=WINDOW, label="window")
     if limit < end:
-        axes.axvspan(0.0, limit, color=COLOURS["reference"], alpha=0.10, lw=0)
+        axes.axvspan(0.0, limit, color=REFERENCE, alpha=0.10, lw=0)
         hatched = axes.axvspan(limit, end, facecolor="0.95", edgecolor="0.75", hatch="////", lw=0)
         hatched.set(zorder=0, label="extrapolated")
         axes.axvline(limit, color="0.25", lw=0.8, label=f"resolved to {limit:.3g} rad/mm")
@@ -123,8 +129,8 @@ def _draw_profiles(axes: Axes, data: ApparatusData, *, floor: float) -> None:
     profiles = np.stack([g - band, g + band, g, unit_gaussian(r, data.gaussian_sigma)])
     low, high, g, gaussian = np.maximum(profiles, floor) / PER_MM2
     draw_band(axes, r / MM, low, high, _BAND)
-    axes.plot(r / MM, g, color=COLOURS["deconvolved"], label="deconvolved G")
-    axes.plot(r / MM, gaussian, "--", color=COLOURS["gaussian"], label="Gaussian fit")
+    axes.plot(r / MM, g, color=DECONVOLVED, label="deconvolved G")
+    axes.plot(r / MM, gaussian, "--", color=GAUSSIAN, label="Gaussian fit")
     axes.set_xlim(0.0, end / MM)
     axes.set_ylabel(f"$G_{{{channel_indices(data)}}}$ (1/mm$^2$)")
 
@@ -189,8 +195,8 @@ def _draw_g(axes: Axes, data: ApparatusData) -> Axes:
     g = field.g[np.ix_(y, x)] / PER_MM2
     plane = (field.x[x] / MM, field.y[y] / MM, g)
     drawn = axes.pcolormesh(*plane, cmap="viridis", rasterized=True)
-    axes.contour(*plane, [g.max() / 2], colors=COLOURS["measured"], linewidths=1.0)
-    axes.plot([], [], color=COLOURS["measured"], lw=1.0, label="half of the largest G")
+    axes.contour(*plane, [g.max() / 2], colors=MEASURED, linewidths=1.0)
+    axes.plot([], [], color=MEASURED, lw=1.0, label="half of the largest G")
     legend_above(axes)
     _finish(axes, drawn, f"$G_{{{channel_indices(data)}}}$ (1/mm$^2$)")
     return axes
@@ -238,7 +244,7 @@ def calibration_figure(result: Calibrated) -> Figure:
     every = math.ceil(count / _MOST_DRAWN)
     raster = data.reconvolution.offset_x is not None
     if every > 1 and not raster:
-        lines.append((f"Of {count:,} points one in {every} is drawn.", COLOURS["muted"], "normal"))
+        lines.append((f"Of {count:,} points one in {every} is drawn.", MUTED, "normal"))
         data = replace(
             data, reconvolution=some_points(data.reconvolution, slice(None, None, every))
         )
@@ -311,13 +317,13 @@ def values_text(data: ApparatusData) -> str:
 
 def _text_lines(data: ApparatusData, loads: Loads) -> list[_Line]:
     """Return the lines above the panels, with the colour and the weight of each."""
-    ink = COLOURS["measured"]
+    ink = MEASURED
     # A long name is cut, not the channel behind it.
     name = textwrap.shorten(f"Apparatus function of {sensor_name(data)}", 82, placeholder=" …")
     title = textwrap.shorten(f"{name}, channel {data.sensor.channel}", 95, placeholder=" …")
-    lines = [(title, ink, "bold"), (_setting(data, loads), COLOURS["muted"], "normal")]
+    lines = [(title, ink, "bold"), (_setting(data, loads), MUTED, "normal")]
     lines.append((values_text(data), ink, "normal"))
-    colour = ink if data.passed else COLOURS["failed"]
+    colour = ink if data.passed else FAILED
     said = textwrap.wrap(verdict(data.checks), _LINE_WIDTH)
     return lines + [(line, colour, "normal") for line in said]
 

@@ -12,8 +12,12 @@ from matplotlib.patches import Rectangle
 from memscal.estimation.points import MINIMUM_POSITIONS, loads_differ
 from memscal.figures.style import (
     ALONG_RADIUS,
-    COLOURS,
+    DECONVOLVED,
     EXPANDED,
+    GAUSSIAN,
+    MEASURED,
+    MUTED,
+    REFERENCE,
     SCATTER_THRESHOLD,
     channel_indices,
     draw_measured,
@@ -53,7 +57,7 @@ def _draw_scan(axes: Axes, data: ApparatusData, look: _Look) -> Any:
 
 def draw_scans(panels: Sequence[Axes], loads: Loads) -> None:
     """Draw the scan; of several loads each in a panel of its own, with one label in the middle."""
-    looks = _looks(loads, COLOURS["measured"])
+    looks = _looks(loads, MEASURED)
     drawn = []
     for axes, (load, part), look in zip(panels, loads, looks, strict=False):
         drawn.append(_draw_scan(axes, part, look))
@@ -82,7 +86,7 @@ def draw_scan_log(axes: Axes, data: ApparatusData, loads: Loads) -> None:
     named: list[Any] = []
     limits = []
     heights = []
-    for (load, part), look in zip(loads, _looks(loads, COLOURS["measured"]), strict=True):
+    for (load, part), look in zip(loads, _looks(loads, MEASURED), strict=True):
         signal, limit = _signal_and_limit(part)
         heights += [signal, limit]
         points = _draw_measured(axes, part, signal, look, load or "_points")
@@ -96,7 +100,7 @@ def draw_scan_log(axes: Axes, data: ApparatusData, loads: Loads) -> None:
                 "v",
                 mfc="none",
                 mew=0.7,
-                color=COLOURS["muted"],
+                color=MUTED,
                 ms=0.8 * marker_size(x.size),
                 label="less than 2u: upper limit, U + 2u",
                 rasterized=x.size > SCATTER_THRESHOLD,
@@ -173,15 +177,15 @@ def _draw_predictions(axes: Axes, data: ApparatusData, *, net: bool = False) -> 
     interleaved = _aligned(data) and np.min(gaps) < 0.3 * np.median(gaps)
     mixed = scan.offset_x is not None or _joint(data) or interleaved
     for u, colour, label, dashes, marker in (
-        (scan.u_zz_predicted, "deconvolved", "reconvolved, G", "-", "o"),
-        (scan.u_zz_gaussian, "gaussian", "reconvolved, Gaussian", "--", "x"),
+        (scan.u_zz_predicted, DECONVOLVED, "reconvolved, G", "-", "o"),
+        (scan.u_zz_gaussian, GAUSSIAN, "reconvolved, Gaussian", "--", "x"),
     ):
         x, curve = _as_curve(scan.x, u - background)
         if net:
             curve = _turned(data, x) * curve
             curve = np.where(curve > 0, curve, np.nan)
         (line,) = axes.plot(x / MM, curve / data.reading.scale, dashes, label=label, zorder=3)
-        line.set_color(COLOURS[colour])
+        line.set_color(colour)
         if mixed or np.any(np.diff(x) <= 0):  # many voltages near one x, which no line joins
             line.set(linestyle="none", marker=marker, rasterized=True)
             line.set_markersize(1.2 if x.size > SCATTER_THRESHOLD else 2.5)
@@ -230,7 +234,7 @@ def _draw_reference(axes: Axes, data: ApparatusData, *, net: bool = False) -> Fl
         "-.",
         lw=1.0,
         zorder=1.5,
-        color=COLOURS["reference"],
+        color=REFERENCE,
         label=rf"reference $\sigma_{{{channel_indices(data)}}}$ (right axis)",
     )
     return np.asarray(peak)
@@ -361,9 +365,9 @@ def draw_residuals(axes: Axes, data: ApparatusData, loads: Loads) -> None:
         "mew": 0.3 if many else 0.7,
         "rasterized": many,
     }
-    gaussian = common | {"color": COLOURS["gaussian"], "marker": "s", "mfc": "none"}
+    gaussian = common | {"color": GAUSSIAN, "marker": "s", "mfc": "none"}
     draw_residual_points(axes, scan.x, with_gaussian, "Gaussian", limit, gaussian)
-    looks = _looks(loads, COLOURS["deconvolved"])
+    looks = _looks(loads, DECONVOLVED)
     for i, ((load, part), (colour, marker)) in enumerate(zip(loads, looks, strict=True)):
         name = "_" * (i >= MOST_PANELS) + (load or "G")
         z, *_ = standardised(part.reconvolution)

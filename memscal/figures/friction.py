@@ -28,9 +28,13 @@ from memscal.figures.friction_profiles import (
 )
 from memscal.figures.style import (
     ALONG_RADIUS,
-    COLOURS,
     COVERAGE_NOTE,
+    DECONVOLVED,
     EXPANDED,
+    GAUSSIAN,
+    MEASURED,
+    MUTED,
+    REFERENCE,
     legend_above,
     mark,
     panels_of,
@@ -89,7 +93,7 @@ def _draw_maxima(axes: Axes, comparison: FrictionComparison, loading: str) -> No
             capsize=2,
             zorder=3,
             label=lubricated_words(lubrication),
-            **mark(lubrication, COLOURS["measured"]),
+            **mark(lubrication, MEASURED),
         )
     _name_curves(axes, loads, drawn)
     axes.set_xlabel("load (N)")
@@ -193,8 +197,8 @@ def comparison_figures(comparison: FrictionComparison) -> Mapping[str, Callable[
 
 
 _READINGS = {
-    "by_maximum": ("by the maximum", "gaussian", -1),
-    "by_profile": ("by the profile", "deconvolved", 1),
+    "by_maximum": ("by the maximum", GAUSSIAN, -1),
+    "by_profile": ("by the profile", DECONVOLVED, 1),
 }
 #: Both readings of one load stand this share of the loads' span to its left and right.
 _ASIDE = 0.008
@@ -209,10 +213,10 @@ def _draw_effective(axes: Axes, comparison: FrictionComparison, loads: Loads) ->
     for name, (words, colour, side) in _READINGS.items():
         for i, at_load in enumerate(loads):
             x = at_load.load + side * _ASIDE * span
-            look = mark(at_load.lubrication, COLOURS[colour])
+            look = mark(at_load.lubrication, colour)
             _draw_reading(axes, getattr(at_load, name), x, words if i == 0 else "", look)
     joint = joint_estimate(comparison, loads)
-    green = COLOURS["reference"]
+    green = REFERENCE
     axes.axhspan(*interval_ends(joint), color=green, alpha=0.18, lw=0, label="all loads, 95 %")
     if joint.value is not None:
         axes.axhline(float(friction_position(joint.value)), color=green, lw=0.8)
@@ -223,7 +227,7 @@ def _draw_effective(axes: Axes, comparison: FrictionComparison, loads: Loads) ->
 
 
 def _draw_macroscopic(axes: Axes, value: float, u: float | None) -> None:
-    grey = COLOURS["muted"]
+    grey = MUTED
     label = "macroscopic, ±2u" if u else "macroscopic"
     axes.axhline(float(friction_position(value)), color=grey, lw=0.8, ls="--", label=label)
     if u:
@@ -300,7 +304,7 @@ def _draw_likelihood(axes: Axes, comparison: FrictionComparison, loads: Loads) -
         colour, name = looks[at_load.load]
         _draw_rise(axes, at_load.by_profile, color=colour, lw=1.0, label=name)
     joint = joint_estimate(comparison, loads)
-    _draw_rise(axes, joint, color=COLOURS["measured"], lw=1.8, label="all loads")
+    _draw_rise(axes, joint, color=MEASURED, lw=1.8, label="all loads")
     draw_levels(axes)
     friction_axis(axes, "x")
     axes.set_ylabel(RISE)

@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike
 from memscal.errors import InputError
 from memscal.figures.style import (
     ALONG_RADIUS,
-    COLOURS,
     EXPANDED,
+    MEASURED,
     SCATTER_THRESHOLD,
     Looks,
     draw_measured,
@@ -272,7 +272,7 @@ def friction_set_figure(comparison: FrictionComparison, lubrication: str) -> Fig
             _draw_set(beyond, comparison, at_load, frictionless, at_load.p0_max / 100)
             fitted = at_load.by_profile
             draw_residual_band(residual)
-            z = _draw_residuals(residual, comparison, at_load, fitted.best, COLOURS["measured"])
+            z = _draw_residuals(residual, comparison, at_load, fitted.best, MEASURED)
             largest = max(largest, z)
             words = "most likely" if fitted.value is None else "fitted"
             _note(residual, rf"{words}: $\mu_e$ = {friction_name(fitted.best)}", (0.96, 0.93))
@@ -304,7 +304,7 @@ def _draw_set(
 ) -> None:
     """Draw stress less that of some profile at its radii, in a unit (Pa)."""
     profile = at_load.profile
-    look = mark(at_load.lubrication, COLOURS["measured"]) | _BARS
+    look = mark(at_load.lubrication, MEASURED) | _BARS
     # As far as the frictionless profile exceeds a twentieth of its top.
     strong = at_load.calculated[0] > 0.05 * at_load.calculated[0].max()
     r = np.linspace(0.0, profile.r[np.flatnonzero(strong)[-1]], _FINE)

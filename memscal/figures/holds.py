@@ -5,7 +5,7 @@ import math
 import numpy as np
 from matplotlib.figure import Figure
 
-from memscal.figures.style import COLOURS, marker_size, panels_of
+from memscal.figures.style import GAUSSIAN, MEASURED, marker_size, panels_of
 from memscal.model.holds import Holds
 from memscal.model.quantities import MM
 
@@ -27,7 +27,7 @@ def holds_figure(holds: Holds) -> Figure:
     every = math.ceil(holds.line.size / _MOST_ROWS)
     first = holds.line[holds.first]
     last = holds.line[holds.stop - 1]
-    gold = COLOURS["gaussian"]
+    gold = GAUSSIAN
     with panels_of(1.6 * (len(shown) + 1.4), len(shown) + 1) as (figure, panels):
         for axes, name in zip(panels, shown, strict=False):
             label, scale = names[name]
@@ -48,7 +48,7 @@ def holds_figure(holds: Holds) -> Figure:
             x,
             u,
             bars,
-            color=COLOURS["measured"],
+            color=MEASURED,
             fmt="o",
             ms=marker_size(first.size),
             lw=0.8,

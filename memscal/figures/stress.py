@@ -10,9 +10,13 @@ from matplotlib.lines import Line2D
 
 from memscal.figures.style import (
     ALONG_RADIUS,
-    COLOURS,
     COVERAGE_NOTE,
+    DECONVOLVED,
     EXPANDED,
+    GAUSSIAN,
+    MEASURED,
+    MUTED,
+    REFERENCE,
     SCATTER_THRESHOLD,
     along_radius,
     draw_band,
@@ -119,10 +123,10 @@ def _draw_stress(axes: Axes, restored: Restoration) -> None:
     stress = restored.sigma_zz / KPA
     band = EXPANDED * np.sqrt(np.maximum(np.diag(restored.covariance), 0.0)) / KPA
     draw_band(axes, r, stress - band, stress + band)
-    axes.plot(r, stress, color=COLOURS["deconvolved"], label=r"restored $\sigma_{zz}$, ±2u")
+    axes.plot(r, stress, color=DECONVOLVED, label=r"restored $\sigma_{zz}$, ±2u")
     blurred = restored.blurred_stress(restored.r) / KPA
     label = r"blurred again, $S_{zz} = G*\sigma_{zz}$"
-    axes.plot(r, blurred, color=COLOURS["gaussian"], ls="-.", label=label)
+    axes.plot(r, blurred, color=GAUSSIAN, ls="-.", label=label)
     compared = restored.comparison
     if compared is not None:
         label = "expected"
@@ -130,14 +134,14 @@ def _draw_stress(axes: Axes, restored: Restoration) -> None:
             friction = compared.stress.friction
             words = f"friction {friction:.3g}" if friction else "no friction"
             label = rf"calculated $\sigma_{{zz}}$, {words}"
-        axes.plot(r, compared.sigma_zz / KPA, color=COLOURS["reference"], ls="--", label=label)
+        axes.plot(r, compared.sigma_zz / KPA, color=REFERENCE, ls="--", label=label)
     count = restored.points.u.size
     many = count > SCATTER_THRESHOLD
     (points,) = axes.plot(
         restored.distance / MM,
         restored.measured_stress / KPA,
         "o",
-        color=COLOURS["measured"],
+        color=MEASURED,
         mfc="none",
         mew=0.6,
         ms=1.2 if many else 0.8 * marker_size(count),
@@ -157,7 +161,7 @@ def _draw_residuals(axes: Axes, restored: Restoration) -> None:
     limit = max(_LEAST_LIMIT, min(1.1 * np.abs(z).max(), 8.0))
     along = "x" if restored.points.free[0, 0] else "y"
     draw_residual_band(axes)
-    look = {"ls": "none", "marker": "o", "color": COLOURS["measured"], "ms": marker_size(z.size)}
+    look = {"ls": "none", "marker": "o", "color": MEASURED, "ms": marker_size(z.size)}
     draw_residual_points(axes, getattr(restored.points, along), z, "scan", limit, look)
     axes.set(xlabel=f"position ${along}$ (mm)", ylabel="residual / $u$")
     legend_above(axes, columns=1)
@@ -188,7 +192,7 @@ def contact_figure(contact: Contact, *, beside: Sequence[Contact] = ()) -> Figur
 def _draw_loads(axes: Axes, contacts: Sequence[Contact], colours: Sequence[str]) -> None:
     depth = np.array([contact.depth for contact in contacts]) / _MICROMETRE
     load = [contact.load for contact in contacts]
-    axes.plot(depth, load, color=COLOURS["muted"], lw=0.8)
+    axes.plot(depth, load, color=MUTED, lw=0.8)
     axes.scatter(depth, load, c=colours, s=14, zorder=3)
     axes.set_ylim(bottom=0)
     axes.set_xlim(left=min(0.0, 1.05 * depth.min()))

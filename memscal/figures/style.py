@@ -43,15 +43,13 @@ ALONG_RADIUS = "distance from the axis $r$ (mm)"
 FIGURE_WIDTH = 7.2
 """Width in inches of a figure across two columns of a journal."""
 
-COLOURS = {
-    "measured": "#000000",
-    "deconvolved": "#0072B2",
-    "gaussian": "#D55E00",
-    "reference": "#009E73",
-    "window": "#7B3F8C",
-    "muted": "#6B6B6B",
-    "failed": "#A11D00",
-}
+MEASURED = "#000000"
+DECONVOLVED = "#0072B2"
+GAUSSIAN = "#D55E00"
+REFERENCE = "#009E73"
+WINDOW = "#7B3F8C"
+MUTED = "#6B6B6B"
+FAILED = "#A11D00"
 """Okabe and Ito's colours, for colour-blind readers; line styles differ, too, for grey print."""
 
 Looks = dict[float, tuple[str, str]]
@@ -98,7 +96,7 @@ def new_figure(height: float, note: str = "") -> Figure:
     figure = Figure(figsize=(FIGURE_WIDTH, height + room), layout=layout)
     FigureCanvasAgg(figure)
     if note:
-        figure.text(0.01, 0.3 * share, note, color=COLOURS["muted"], fontsize=7)
+        figure.text(0.01, 0.3 * share, note, color=MUTED, fontsize=7)
     return figure
 
 
@@ -150,7 +148,7 @@ def legend_above(
 def shades(count: int, first: float) -> list[str]:
     """Return colours that get darker along a path, also in grey; the first from 0 to 1."""
     if count == 1:
-        return [COLOURS["deconvolved"]]
+        return [DECONVOLVED]
     colours = mpl.colormaps["viridis_r"](np.linspace(first, 1.0, count))
     return [mpl.colors.to_hex(colour) for colour in colours]
 
@@ -193,7 +191,7 @@ def draw_band(
     axes: Axes, x: FloatArray, low: FloatArray, high: FloatArray, label: str | None = None
 ) -> None:
     """Draw the band of a curve's expanded uncertainty."""
-    axes.fill_between(x, low, high, color=COLOURS["deconvolved"], alpha=0.25, lw=0, label=label)
+    axes.fill_between(x, low, high, color=DECONVOLVED, alpha=0.25, lw=0, label=label)
 
 
 def draw_residual_band(axes: Axes) -> None:

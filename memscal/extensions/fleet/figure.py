@@ -8,7 +8,16 @@ from matplotlib.ticker import MaxNLocator
 from memscal.extensions.fleet.results import FleetResults, robust_limit, robust_spread
 from memscal.extensions.fleet.results_summary import error_classes, failures, verdict
 from memscal.figures.report import Picture, Report
-from memscal.figures.style import COLOURS, drawable, legend_above, panels_of
+from memscal.figures.style import (
+    DECONVOLVED,
+    FAILED,
+    GAUSSIAN,
+    MEASURED,
+    MUTED,
+    drawable,
+    legend_above,
+    panels_of,
+)
 from memscal.model.arrays import FloatArray, Values
 from memscal.summaries.declared import power_of_ten
 
@@ -51,12 +60,12 @@ def _distribution(axes: Axes, values: FloatArray, label: str) -> None:
     high = min(values.max(), centre + reach)
     inside = values[(values >= low) & (values <= high)]
     bins = int(np.clip(2 * np.cbrt(inside.size), 5, _MOST_BINS))
-    axes.hist(inside, bins=bins, color=COLOURS["deconvolved"], alpha=0.8)
-    axes.axvline(centre, color=COLOURS["measured"], lw=1, label="median")
+    axes.hist(inside, bins=bins, color=DECONVOLVED, alpha=0.8)
+    axes.axvline(centre, color=MEASURED, lw=1, label="median")
     limits = [centre + sign * limit * spread for sign in (-1, 1) if spread > 0]
     for i, end in enumerate(end for end in limits if low <= end <= high):
         name = f"{'_' * i}{limit:.2g} robust deviations"
-        axes.axvline(end, color=COLOURS["gaussian"], lw=1, ls="--", label=name)
+        axes.axvline(end, color=GAUSSIAN, lw=1, ls="--", label=name)
     if low < high:
         margin = 0.04 * (high - low)
         axes.set_xlim(low - margin, high + margin)
@@ -67,8 +76,8 @@ def _distribution(axes: Axes, values: FloatArray, label: str) -> None:
 
 
 def _failures(axes: Axes, fleet: FleetResults) -> None:
-    bars = [(name.replace("_", " "), n, "failed") for name, n in failures(fleet).items()]
-    bars += [(kind, n, "muted") for kind, n in error_classes(fleet).items()]
+    bars = [(name.replace("_", " "), n, FAILED) for name, n in failures(fleet).items()]
+    bars += [(kind, n, MUTED) for kind, n in error_classes(fleet).items()]
     bars = sorted(bars, key=lambda bar: -bar[1])[:_MOST_BARS][::-1]
     axes.set_xlabel("sensors (grey: errors, not calibrated)")
     if not bars:
@@ -77,7 +86,7 @@ def _failures(axes: Axes, fleet: FleetResults) -> None:
         return
     names, numbers, colours = zip(*bars, strict=True)
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-    axes.barh(range(len(bars)), numbers, color=[COLOURS[colour] for colour in colours])
+    axes.barh(range(len(bars)), numbers, color=colours)
     axes.set_yticks(range(len(bars)), [drawable(name) for name in names], fontsize=7)
     axes.set_ylim(-0.7, max(len(bars), 5) - 0.3)
 
@@ -118,7 +127,7 @@ def _places(figure: Figure, axes: Axes, fleet: FleetResults) -> None:
         x = np.arange(a.size, dtype=np.float64)
         y = change
         placed = np.ones(a.size, dtype=bool)
-        axes.scatter(x, y, s=min(size, 8), color=COLOURS["deconvolved"], **shown)
+        axes.scatter(x, y, s=min(size, 8), color=DECONVOLVED, **shown)
         axes.set_xlabel("place in the batch")
         axes.set_ylabel(label)
     marks = failed & placed
@@ -126,9 +135,9 @@ def _places(figure: Figure, axes: Axes, fleet: FleetResults) -> None:
         shown["linewidths"] = 0.8
         y = np.where(np.isfinite(y), y, 0.0)
         kinds = {"check failed": marks & finite, "not calibrated": marks & ~finite}
-        for (name, some), colour in zip(kinds.items(), ("measured", "muted"), strict=True):
+        for (name, some), colour in zip(kinds.items(), (MEASURED, MUTED), strict=True):
             if some.any():
-                shown |= {"color": COLOURS[colour], "label": f"{name} ({some.sum()})"}
+                shown |= {"color": colour, "label": f"{name} ({some.sum()})"}
                 axes.scatter(x[some], y[some], s=max(size, 6.0), marker="x", **shown)
         axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, fontsize=7)
 

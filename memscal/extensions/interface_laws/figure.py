@@ -15,7 +15,14 @@ from memscal.extensions.interface_laws.results import (
 )
 from memscal.figures.friction import INTERVAL_NOTE, RISE, deviance_rise, draw_levels, interval_ends
 from memscal.figures.friction_profiles import friction_axis, friction_position, lubricated_words
-from memscal.figures.style import COLOURS, draw_band, legend_above, panels_of
+from memscal.figures.style import (
+    DECONVOLVED,
+    GAUSSIAN,
+    MEASURED,
+    draw_band,
+    legend_above,
+    panels_of,
+)
 from memscal.friction.family import bounded
 from memscal.friction.results import FrictionComparison, LoadComparison
 
@@ -23,7 +30,7 @@ _UM = 1e-6
 #: The length in the middle of the axis from 0 to infinity, in m.
 _MIDDLE = 3e-6
 _TICKS = (0.0, 1.0, 2.0, 3.0, 5.0, 10.0, 30.0, np.inf)
-_COLOURS = {"tangential": "deconvolved", "normal": "gaussian"}
+_COLOURS = {"tangential": DECONVOLVED, "normal": GAUSSIAN}
 
 
 def interface_figure(comparison: FrictionComparison | InterfaceComparison) -> Figure:
@@ -56,7 +63,7 @@ def _draw_lengths(axes: Axes, by_direction: dict[str, LawComparison]) -> None:
         place = bounded(compared.length.values, _MIDDLE)
         rise = deviance_rise(compared.length)
         label = f"{direction}, {lubricated_words(compared.lubrication)}"
-        axes.plot(place, rise, color=COLOURS[_COLOURS[direction]], label=label)
+        axes.plot(place, rise, color=_COLOURS[direction], label=label)
     draw_levels(axes)
     names = ["∞" if np.isinf(tick) else f"{tick:g}" for tick in _TICKS]
     axes.xaxis.set_ticks(bounded(np.array(_TICKS) * _UM, _MIDDLE), names)
@@ -73,7 +80,7 @@ def _draw_marginal_likelihoods(axes: Axes, by_direction: dict[str, LawComparison
         for law in compared.laws:
             below = law.log_evidence - best
             axes.plot([below, 0.0], [height, height], color="0.8", lw=0.8, zorder=1)
-            axes.plot(below, height, "o", color=COLOURS[_COLOURS[direction]], ms=5)
+            axes.plot(below, height, "o", color=_COLOURS[direction], ms=5)
             names.append(textwrap.fill(law.name, 22))
             height += 1
     axes.yaxis.set_ticks(range(height), names)
@@ -85,8 +92,8 @@ def _draw_marginal_likelihoods(axes: Axes, by_direction: dict[str, LawComparison
 def _draw_implied(axes: Axes, implied: ImpliedFriction, measured: Sequence[LoadComparison]) -> None:
     low, best, high = friction_position(np.sort(implied.friction, axis=1)).T
     draw_band(axes, implied.loads, low, high)
-    axes.plot(implied.loads, best, color=COLOURS["deconvolved"], label="what the slip length means")
-    black = COLOURS["measured"]
+    axes.plot(implied.loads, best, color=DECONVOLVED, label="what the slip length means")
+    black = MEASURED
     for i, at_load in enumerate(measured):
         reading = at_load.by_profile
         label = "found at each load" if i == 0 else "_found"

@@ -5,7 +5,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from memscal.extensions.monte_carlo.sweep import Sweep
-from memscal.figures.style import COLOURS, panels_of
+from memscal.figures.style import DECONVOLVED, GAUSSIAN, MUTED, panels_of
 from memscal.model.arrays import FloatArray, Values
 from memscal.model.quantities import ESTIMATED, MM
 from memscal.summaries.declared import power_of_ten
@@ -56,7 +56,7 @@ def _draw_row(axes: Axes, amplitude: FloatArray, exact: FloatArray, draws: Float
     low, high = _limits(exact, draws)
     if np.any(np.isfinite(draws)):
         _draw_seeds(axes, amplitude, draws, (low, high))
-    (line,) = axes.plot(amplitude, exact, "-o", color=COLOURS["deconvolved"], ms=4, zorder=4)
+    (line,) = axes.plot(amplitude, exact, "-o", color=DECONVOLVED, ms=4, zorder=4)
     line.set_label("exact expectation")
     axes.set_ylim(low, high)
 
@@ -64,11 +64,11 @@ def _draw_row(axes: Axes, amplitude: FloatArray, exact: FloatArray, draws: Float
 def _draw_seeds(
     axes: Axes, amplitude: FloatArray, draws: FloatArray, limits: tuple[float, float]
 ) -> None:
-    look: Values = {"color": COLOURS["gaussian"], "ms": 4}
+    look: Values = {"color": GAUSSIAN, "ms": 4}
     drawn = np.any(np.isfinite(draws), axis=1)
     x = amplitude[drawn]
     lower, median, upper = np.nanquantile(draws[drawn], (_INNER[0], 0.5, _INNER[1]), axis=1)
-    band = axes.fill_between(x, lower, upper, color=COLOURS["gaussian"], alpha=0.2, lw=0)
+    band = axes.fill_between(x, lower, upper, color=GAUSSIAN, alpha=0.2, lw=0)
     band.set_label("middle 68 % of draws")
     across = np.broadcast_to(amplitude[:, None], draws.shape)
     axes.plot(across.ravel(), draws.ravel(), ".", alpha=0.6, mew=0, label="one draw", **look)
@@ -82,7 +82,7 @@ def _draw_seeds(
         axes.plot(places, level, marker, transform=axes.get_xaxis_transform(), **look)
     if outside:
         note = f"{outside} of {np.sum(np.isfinite(draws))} draws beyond the axis"
-        axes.set_title(note, loc="right", fontsize=7, color=COLOURS["muted"], pad=2)
+        axes.set_title(note, loc="right", fontsize=7, color=MUTED, pad=2)
 
 
 def _limits(exact: FloatArray, draws: FloatArray) -> tuple[float, float]:

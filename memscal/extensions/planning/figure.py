@@ -10,8 +10,12 @@ from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 from memscal.errors import InputError
 from memscal.extensions.planning.design import Design, varied_designs
 from memscal.figures.style import (
-    COLOURS,
+    DECONVOLVED,
     EXPANDED,
+    GAUSSIAN,
+    MEASURED,
+    MUTED,
+    WINDOW,
     along_radius,
     draw_band,
     legend_above,
@@ -34,8 +38,8 @@ _AXES = {
     "repeats": ("repeats", 1),
 }
 _CURVES = (
-    ("conversion_constant", "A", "deconvolved", "o"),
-    ("gaussian_sigma", "σ", "gaussian", "s"),
+    ("conversion_constant", "A", DECONVOLVED, "o"),
+    ("gaussian_sigma", "σ", GAUSSIAN, "s"),
 )
 
 
@@ -58,9 +62,9 @@ def _draw_radial(axes: Axes, planned: Design) -> None:
     samples = np.stack([planned.g, EXPANDED * planned.g_errors])
     g, error = on_axis(planned.r, samples, r) / PER_MM2
     draw_band(axes, r / MM, g - error, g + error, "±2u")
-    axes.plot(r / MM, g, color=COLOURS["deconvolved"], label="G expected")
+    axes.plot(r / MM, g, color=DECONVOLVED, label="G expected")
     assumed = planned.plan.kernel.radial(r) / PER_MM2
-    axes.plot(r / MM, assumed, color=COLOURS["measured"], ls=":", label="G assumed")
+    axes.plot(r / MM, assumed, color=MEASURED, ls=":", label="G assumed")
     along_radius(axes, r, "$G_{zz}$ (1/mm$^2$)")
     legend_above(axes)
 
@@ -70,10 +74,10 @@ def _draw_transfer(axes: Axes, planned: Design) -> None:
     k = np.linspace(0.0, min(_BANDS * resolved, planned.k[-1]), _FINE)
     samples = np.stack([planned.transfer, EXPANDED * planned.transfer_errors])
     transfer, error = on_axis(planned.k, samples, k)
-    axes.axvspan(0, resolved / PER_MM, color=COLOURS["window"], alpha=0.12, lw=0)
-    axes.axvline(resolved / PER_MM, color=COLOURS["window"], ls=":", label="resolved")
+    axes.axvspan(0, resolved / PER_MM, color=WINDOW, alpha=0.12, lw=0)
+    axes.axvline(resolved / PER_MM, color=WINDOW, ls=":", label="resolved")
     draw_band(axes, k / PER_MM, transfer - error, transfer + error)
-    axes.plot(k / PER_MM, transfer, color=COLOURS["deconvolved"], label="modulus for G")
+    axes.plot(k / PER_MM, transfer, color=DECONVOLVED, label="modulus for G")
     axes.set_xlim(0, k[-1] / PER_MM)
     axes.set(xlabel="wavenumber $k$ (rad/mm)", ylabel="transfer function (1)", ylim=(0, None))
     legend_above(axes)
@@ -87,11 +91,11 @@ def _draw_varied(axes: Axes, planned: Design, vary: str) -> None:
         total = np.array([varied.relative_uncertainty(name) for varied in designs])
         noise = np.array([varied.budget[name]["noise"] for varied in designs])
         noise /= np.abs([varied.parameters[name] for varied in designs])
-        look: dict[str, Any] = {"color": COLOURS[colour], "marker": marker, "ms": 3}
+        look: dict[str, Any] = {"color": colour, "marker": marker, "ms": 3}
         axes.plot(along, 100 * EXPANDED * total, label=symbol, **look)
         axes.plot(along, 100 * EXPANDED * noise, ls="--", mfc="none", **look)
     axes.plot([], [], color="0.4", ls="--", label="noise alone")
-    axes.axvline(getattr(planned.plan, vary) / scale, color=COLOURS["muted"], ls=":", lw=0.8)
+    axes.axvline(getattr(planned.plan, vary) / scale, color=MUTED, ls=":", lw=0.8)
     axes.set(xscale="log", yscale="log", xlabel=label, ylabel="relative uncertainty, 2u (%)")
     # 0.5 and 20 in place of powers of ten: the axes span a decade or two.
     for axis in (axes.xaxis, axes.yaxis):
