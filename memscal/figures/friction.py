@@ -175,7 +175,7 @@ def comparison_figure(
         profiles.set_xlabel(ALONG_RADIUS)
         residuals.set_xlim(profiles.get_xlim())
         _draw_effective(effective, comparison, loads)
-        legend_above(effective, columns=2)
+        legend_above(effective)
     return figure
 
 

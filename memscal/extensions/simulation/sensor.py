@@ -142,7 +142,7 @@ def simulated_scan(
         channels=tangential,
         load=load,
         load_uncertainty=None if uncertainty is None else uncertainty * load,
-        sensor=StressSensor(name="a simulated sensor", channel="zz"),
+        sensor=StressSensor(name="a simulated sensor"),
         notes="Synthetic data made by memscal simulate; nothing here was measured.",
         synthetic={
             **sensor.kernel.describe(),
