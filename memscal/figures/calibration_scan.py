@@ -22,13 +22,12 @@ from memscal.figures.style import (
     channel_indices,
     draw_measured,
     draw_residual_band,
-    draw_residual_points,
     legend_above,
     marker_size,
     shades,
 )
 from memscal.model.apparatus import ApparatusData, Reconvolution
-from memscal.model.arrays import ArrayPair, FloatArray
+from memscal.model.arrays import ArrayPair, FloatArray, Values
 from memscal.model.checks import REPEAT_CENTRES
 from memscal.model.film import LINEAR
 from memscal.model.indenter import Rod
@@ -366,16 +365,29 @@ def draw_residuals(axes: Axes, data: ApparatusData, loads: Loads) -> None:
         "rasterized": many,
     }
     gaussian = common | {"color": GAUSSIAN, "marker": "s", "mfc": "none"}
-    draw_residual_points(axes, scan.x, with_gaussian, "Gaussian", limit, gaussian)
+    _draw_residual_points(axes, scan.x, with_gaussian, "Gaussian", limit, gaussian)
     looks = _looks(loads, DECONVOLVED)
     for i, ((load, part), (colour, marker)) in enumerate(zip(loads, looks, strict=True)):
         name = "_" * (i >= MOST_PANELS) + (load or "G")
         z, *_ = standardised(part.reconvolution)
         look = common | {"color": colour, "marker": marker, "mfc": colour}
-        draw_residual_points(axes, part.reconvolution.x, z, name, limit, look)
+        _draw_residual_points(axes, part.reconvolution.x, z, name, limit, look)
+    axes.set_ylim(-limit, limit)
     axes.set_ylabel(f"residual / {scale}")
     _limit_to_scan(axes, scan.x)
     legend_above(axes, points=scan.x.size)
+
+
+def _draw_residual_points(
+    axes: Axes, x: FloatArray, z: FloatArray, name: str, limit: float, look: Values
+) -> None:
+    rms = np.sqrt(np.mean(z**2))
+    axes.plot(x / MM, z, label=f"{name}: rms {rms:.2f}", **look)
+    for side, edge_marker in ((1, "^"), (-1, "v")):
+        beyond = x[side * z > limit] / MM
+        if beyond.size:
+            edge = np.full(beyond.size, 0.93 * side * limit)
+            axes.plot(beyond, edge, edge_marker, color=look["color"], ms=4)
 
 
 def standardised(scan: Reconvolution) -> tuple[FloatArray, FloatArray, str]:

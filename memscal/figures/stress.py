@@ -13,6 +13,7 @@ from memscal.figures.style import (
     COVERAGE_NOTE,
     DECONVOLVED,
     EXPANDED,
+    FAILED,
     GAUSSIAN,
     MEASURED,
     MUTED,
@@ -22,7 +23,6 @@ from memscal.figures.style import (
     draw_band,
     draw_measured,
     draw_residual_band,
-    draw_residual_points,
     draw_zero,
     legend_above,
     load_looks,
@@ -159,10 +159,16 @@ def _draw_residuals(axes: Axes, restored: Restoration) -> None:
     """Draw residuals over their noise; those beyond the axis are drawn at its edge."""
     z = restored.residual / restored.noise
     limit = max(_LEAST_LIMIT, min(1.1 * np.abs(z).max(), 8.0))
+    ordinary = np.abs(z) <= limit
     along = "x" if restored.points.free[0, 0] else "y"
+    side = getattr(restored.points, along) / MM
     draw_residual_band(axes)
-    look = {"ls": "none", "marker": "o", "color": MEASURED, "ms": marker_size(z.size)}
-    draw_residual_points(axes, getattr(restored.points, along), z, "scan", limit, look)
+    size = marker_size(z.size)
+    label = f"scan: rms {np.sqrt(np.mean(z**2)):.2f}"
+    axes.plot(side[ordinary], z[ordinary], "o", color=MEASURED, ms=size, label=label)
+    edge = 0.93 * limit * np.sign(z[~ordinary])
+    axes.plot(side[~ordinary], edge, "^", color=FAILED, ms=4)
+    axes.set_ylim(-limit, limit)
     axes.set(xlabel=f"position ${along}$ (mm)", ylabel="residual / $u$")
     legend_above(axes, columns=1)
 

@@ -200,20 +200,6 @@ def draw_residual_band(axes: Axes) -> None:
     axes.axhline(0.0, color="0.4", lw=0.6)
 
 
-def draw_residual_points(
-    axes: Axes, x: FloatArray, z: FloatArray, name: str, limit: float, look: Values
-) -> None:
-    """Draw residuals over their uncertainty at places in m, what is beyond a limit at its edge."""
-    rms = np.sqrt(np.mean(z**2))
-    axes.plot(x / MM, z, label=f"{name}: rms {rms:.2f}", **look)
-    for side, edge_marker in ((1, "^"), (-1, "v")):
-        beyond = x[side * z > limit] / MM
-        if beyond.size:
-            edge = np.full(beyond.size, 0.93 * side * limit)
-            axes.plot(beyond, edge, edge_marker, color=look["color"], ms=4)
-    axes.set_ylim(-limit, limit)
-
-
 def draw_zero(axes: Axes) -> None:
     """Draw the line of no stress, behind all data."""
     axes.axhline(0.0, color="0.8", lw=0.5, zorder=0)
