@@ -78,7 +78,7 @@ def same_apparatus(
     measured: MeasuredStress, apparatus: ApparatusFunction, *, override: bool
 ) -> MeasuredStress:
     """Refuse another apparatus function than that of a measured stress; or record it."""
-    differences = list(accepted_alterations(apparatus.source))
+    differences = accepted_alterations(apparatus.source)
     if measured.artifact_digest != apparatus.content_digest:
         name = f" ({measured.artifact.file_name})" if measured.artifact else ""
         given = f" ({apparatus.source.file_name})" if apparatus.source else ""
@@ -388,7 +388,7 @@ def _families(
     if len(values) < 2:
         problem = "One friction coefficient is nothing to choose from."
         raise InputError(problem, cure="Give several, such as 0, 0.1, 0.3 and infinity.")
-    loadings = (loading,) if isinstance(loading, str) else tuple(dict.fromkeys(loading))
+    loadings = (loading,) if isinstance(loading, str) else loading
     if not loadings:
         raise InputError('No loading was given: "incremental", "total", or both.')
     return {

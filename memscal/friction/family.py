@@ -353,7 +353,7 @@ class FamilySetup:
         if film.poisson_ratio_uncertainty:
             step = max(film.poisson_ratio_uncertainty, _SMALLEST_STEP)
             ratios = [min(nu + step, 0.5), max(nu - step, 0.0)]  # one-sided if incompressible
-        groups = [list(paths)]
+        groups = [paths]
         for ratio in ratios:
             changed = replace(film, poisson_ratio=ratio)
             whole = ratio == nu

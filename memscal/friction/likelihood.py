@@ -256,12 +256,13 @@ def sensor_of(
     shared |= {f"calibration_{name}": change for name, change in calibration.items()}
     if changes.shape[1]:
         # Any rotation of independent changes is another set of them: in this one few matter.
-        bessel = j1 if family.order else j0
         radii = np.linspace(0.0, reach, _RADII)
-        kernel = bessel(np.outer(radii, nodes.k)) * nodes.weights
         middle = family.spectra[family.values.size // 2]
         largest = np.abs(middle).max(axis=1) if family.order else middle[:, 0]
-        signals = [(kernel * shape) @ changes for shape in middle / largest[:, None]]
+        signals = [
+            nodes.synthesise(shape[:, None] * changes, radii, order=family.order)
+            for shape in middle / largest[:, None]
+        ]
         _, sizes, axes = np.linalg.svd(np.concatenate(signals), full_matrices=False)
         changes = changes @ axes[sizes > _NEGLIGIBLE * sizes[0]].T
     constant = apparatus.conversion_constant

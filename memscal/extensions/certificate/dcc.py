@@ -77,7 +77,7 @@ def _texts(certificate: Certificate) -> dict[str, str]:
         "accreditation": certificate.accreditation,
         "quality": " ".join(certificate.warnings) or "No check failed.",
         "assumptions": " ".join(assumptions) or "None is recorded.",
-        "method": str(process.configuration.get("method", "not stated")),
+        "method": process.configuration.get("method", "not stated"),
         "temperature": _numbers(t.value - ZERO_CELSIUS),
         "temperature_expanded": _numbers(COVERAGE_FACTOR * t.uncertainty),
         "humidity": _numbers(100 * humidity.value),
