@@ -69,9 +69,11 @@ def require_contacts(scans: Sequence[Scan | MeasuredScan]) -> None:
             require_line(place, scan.x, scan.y)
         if (scan.film, scan.indenter) != (scans[0].film, scans[0].indenter):
             problem = f"{place} states another film or sphere than the first scan."
-            why = "Scans that are compared together share the calculated contacts."
-            cure = "Compare them one by one, or correct /entry/sample/film and /entry/indenter."
-            raise InputError(problem, why=why, cure=cure)
+            raise InputError(
+                problem,
+                why="Scans that are compared together share the calculated contacts.",
+                cure="Compare them one by one, or correct /entry/sample/film and /entry/indenter.",
+            )
 
 
 def same_apparatus(
@@ -241,8 +243,10 @@ def compare(
         others = (references, lubricated, shear, macroscopic)
         if any(option is not None for option in others):
             problem = "The artifact is of a tangential channel, with options of the normal one."
-            cure = "Leave out references, lubricated, shear and macroscopic, or give that of zz."
-            raise InputError(problem, cure=cure)
+            raise InputError(
+                problem,
+                cure="Leave out references, lubricated, shear and macroscopic, or give that of zz.",
+            )
         return _compared_by_shear(measured, sensor, setting, friction, loading, override)
     if tangential is not None and references is not None:
         problem = "Profiles of another program and the shear are asked for."
@@ -296,12 +300,14 @@ def _require_macroscopic(
     if uncertainty is not None:
         require_non_negative("uncertainty of the macroscopic coefficient", uncertainty)
     if value is None and (interface or uncertainty is not None):
-        problem = "The macroscopic friction coefficient is not given."
         why = "Its uncertainty has no use without it."
         if interface:
             why = "Laws of the interface are weighed at it."
-        cure = "Give macroscopic, such as from a measurement of sliding."
-        raise InputError(problem, why=why, cure=cure)
+        raise InputError(
+            "The macroscopic friction coefficient is not given.",
+            why=why,
+            cure="Give macroscopic, such as from a measurement of sliding.",
+        )
 
 
 def _require_few(contacts: Sequence[Scan | MeasuredStress], channels: Sequence[str]) -> None:
@@ -386,8 +392,10 @@ def _families(
         return {family.loading: family}
     values = FRICTIONS if friction is None else tuple(float(mu) for mu in friction)
     if len(values) < 2:
-        problem = "One friction coefficient is nothing to choose from."
-        raise InputError(problem, cure="Give several, such as 0, 0.1, 0.3 and infinity.")
+        raise InputError(
+            "One friction coefficient is nothing to choose from.",
+            cure="Give several, such as 0, 0.1, 0.3 and infinity.",
+        )
     loadings = (loading,) if isinstance(loading, str) else loading
     if not loadings:
         raise InputError('No loading was given: "incremental", "total", or both.')
@@ -546,5 +554,10 @@ def _accept_tangential(
         *accepted_alterations(sensor.source),
         *accept_other_sensor(measured.scans[0], sensor, ("name",), override=override),
     ]
-    note = f"Channel {channel} is experimental: comparisons were tested on synthetic scans only."
-    return [*override_messages(overridden), Message("experimental", note)]
+    return [
+        *override_messages(overridden),
+        Message(
+            "experimental",
+            f"Channel {channel} is experimental: comparisons were tested on synthetic scans only.",
+        ),
+    ]

@@ -188,11 +188,10 @@ def _section(where: str, section: str, content: Any) -> Values:
 def _require_known(where: str, key: str, known: list[str]) -> None:
     if key not in known:
         close = get_close_matches(key, known, 1, 0.5)
-        cure = f"Did you mean {close[0]}?" if close else f"It may have {', '.join(known)}."
         raise FormatError(
             f"{where} has {key}, which is not known.",
             why="What is misspelt would be missing in the certificate.",
-            cure=cure,
+            cure=f"Did you mean {close[0]}?" if close else f"It may have {', '.join(known)}.",
         )
 
 

@@ -204,8 +204,9 @@ def _messages(
 ) -> Iterator[Message]:
     """Say what was assumed, and what the comparison cannot tell."""
     if any(not profile.lubrication for profile in dry):
-        text = "Scans that do not state their lubrication were taken as dry."
-        yield Message("lubrication_unstated", text)
+        yield Message(
+            "lubrication_unstated", "Scans that do not state their lubrication were taken as dry."
+        )
     if tangential is not None and uncertainty is None:
         yield Message(
             "uncertainty_unstated",

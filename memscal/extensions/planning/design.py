@@ -457,8 +457,11 @@ def _out_of_reach(what: str, targets: Targets, tried: list[Design]) -> FitError:
         )
     source = best.largest_source(name)
     share = best.budget[name][source] / abs(best.parameters[name])
-    cure = _CURES.get(source, "Reduce that contribution, or want less.")
-    return FitError(problem, why=f"{source} alone contributes {share * 100:.3g} %.", cure=cure)
+    return FitError(
+        problem,
+        why=f"{source} alone contributes {share * 100:.3g} %.",
+        cure=_CURES.get(source, "Reduce that contribution, or want less."),
+    )
 
 
 @single_threaded()

@@ -18,8 +18,10 @@ def open_datasets(path: FilePath, named: Mapping[str, Any], **reading: Any) -> R
     with open_hdf5(path) as file:
         schema = file.attribute("/", SCHEMA_ATTRIBUTE)
         if schema is not None:
-            problem = f"{file.name} is no table, but has the schema {schema!r}."
-            raise InputError(problem, cure="Give it to memscal as it is.")
+            raise InputError(
+                f"{file.name} is no table, but has the schema {schema!r}.",
+                cure="Give it to memscal as it is.",
+            )
         stated = {name: str(column) for name, column in named.items() if column is not None}
         defaults = {} if stated.keys() & {"x", "y", "u_zz"} else _plotted(file)
         stated |= defaults

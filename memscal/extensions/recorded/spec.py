@@ -32,9 +32,10 @@ class SpecScan(TextTable):
         numbers = [int(number) for number in _SCAN.findall(text.replace("\r", "\n"))]
         place = numbers.index(scan) + 1 if numbers.count(scan) == 1 else scan
         if not 0 < place <= len(numbers):
-            why = f"It has {len(numbers)} (lines that begin with #S)."
             raise FormatError(
-                f"{PurePath(path).name} has no scan {scan}.", why=why, cure="Give another."
+                f"{PurePath(path).name} has no scan {scan}.",
+                why=f"It has {len(numbers)} (lines that begin with #S).",
+                cure="Give another.",
             )
         return place
 

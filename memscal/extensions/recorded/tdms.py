@@ -93,9 +93,11 @@ def _require_whole(name: str, data: bytes) -> None:
         known = added if contents & _NEW_LIST else known + added
         listed += known + _SEGMENT
     if position != len(data):
-        problem = f"{name} does not end where its last segment does."
-        why = "It was cut short, not closed, or is in too many pieces."
-        raise FormatError(problem, why=why, cure=_DEFRAGMENT)
+        raise FormatError(
+            f"{name} does not end where its last segment does.",
+            why="It was cut short, not closed, or is in too many pieces.",
+            cure=_DEFRAGMENT,
+        )
 
 
 def _require_bounded(where: str, owners: Sequence[Any], size: int) -> None:

@@ -58,8 +58,7 @@ def simulate_contacts(
     _require_row(loads, points, spacing, repeats, seed)
     require_positive("load_scale", load_scale)
     sensor = simulated_sensor(kernel, conversion_constant, shear)
-    interface = interface or Interface()
-    law = {"friction": friction, "loading": loading, "interface": interface}
+    law = {"friction": friction, "loading": loading, "interface": interface or Interface()}
     states, spread = _pressed(film, sphere, load_scale * loads, law, disturbances.load_scatter)
 
     x = np.linspace(-1.0, 1.0, points) * (0.5 * (points - 1) * spacing)
@@ -102,19 +101,7 @@ def simulate_contacts(
         seed,
         x=x,
         loads=loads,
-        truth={
-            **described_film(film),
-            "indenter_radius": sphere.radius,
-            "friction": float(friction),
-            "loading": loading,
-            **_described_interface(interface),
-            "load_scale": float(load_scale),
-            **{f"load_{j}": float(load_scale * load) for j, load in enumerate(loads, 1)},
-            "load_scatter": disturbances.load_scatter,
-            "position_error": position_error,
-            "centre": centre_x,
-            "centre_y": centre_y,
-        },
+        truth=_truth(film, sphere, law, load_scale, loads, disturbances),
         x_errors=np.full(points, position_error) if position_error > 0 else None,
         normal_load=stated.reshape(shape),
         normal_load_errors=(uncertainty * stated).reshape(shape) if uncertainty > 0 else None,
@@ -170,6 +157,30 @@ def described_film(film: ElasticFilm) -> dict[str, float]:
     """Return what of a true film decides over its base stress, by the names of a truth."""
     names = ("young_modulus", "poisson_ratio", "thickness")
     return {name: float(getattr(film.expected, name)) for name in names}
+
+
+def _truth(
+    film: ElasticFilm,
+    sphere: Sphere,
+    law: Values,
+    load_scale: float,
+    loads: FloatArray,
+    disturbances: Disturbances,
+) -> Truth:
+    """Return what was pressed on what, where and how, by the names of a truth."""
+    return {
+        **described_film(film),
+        "indenter_radius": sphere.radius,
+        "friction": float(law["friction"]),
+        "loading": law["loading"],
+        **_described_interface(law["interface"]),
+        "load_scale": float(load_scale),
+        **{f"load_{j}": float(load_scale * load) for j, load in enumerate(loads, 1)},
+        "load_scatter": disturbances.load_scatter,
+        "position_error": disturbances.position_error,
+        "centre": disturbances.centre[0],
+        "centre_y": disturbances.centre[1],
+    }
 
 
 def _described_interface(interface: Interface) -> Truth:
