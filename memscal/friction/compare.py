@@ -27,7 +27,7 @@ from memscal.friction.likelihood import (
     require_line,
     sensor_of,
 )
-from memscal.friction.results import BoundedEstimate, FrictionComparison, LoadComparison
+from memscal.friction.results import FrictionComparison, Joint, LoadComparison, Macroscopic
 from memscal.measurement.measure_stress import joined_stress, measure_stress
 from memscal.measurement.posterior import common_inputs
 from memscal.measurement.restore import accept_other_sensor, load_of, single_loads
@@ -414,7 +414,7 @@ def compare_measured(
     between_scan_gain: float = BETWEEN_SCAN_GAIN,
     shear: ApparatusFunction | None = None,
     shear_families: Mapping[str, ProfileFamily] | None = None,
-    macroscopic: tuple[float, float | None] | None = None,
+    macroscopic: Macroscopic | None = None,
 ) -> FrictionComparison:
     """Compare measured stress with families by loading, which hold every measured load."""
     channels = channels_of(measured, apparatus, families, (), between_scan_gain)
@@ -489,7 +489,7 @@ def fit_together(
     measured: MeasuredStress,
     fits: Mapping[str, FrictionFit],
     lubricated_friction: float | None = None,
-) -> dict[str, dict[str, BoundedEstimate]]:
+) -> Joint:
     """Fit all loads of a kind; the dry beside lubricated ones of about that friction, if any."""
     indices: dict[str, list[int]] = {}
     for i, profile in enumerate(measured.profiles):

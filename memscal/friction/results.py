@@ -145,6 +145,8 @@ class BoundedEstimate:
 ByLoading = Mapping[str, BoundedEstimate]
 Joint = Mapping[str, ByLoading]
 """Coefficients of all loads together, by lubrication and loading."""
+Macroscopic = tuple[float, float | None]
+"""A friction coefficient that was measured otherwise, and its standard uncertainty."""
 
 
 def _rounded(value: float, low: float, high: float) -> str:
@@ -285,10 +287,10 @@ class FrictionComparison(Result, Checked):
     measured: MeasuredStress
     friction: FloatArray
     loads: Mapping[str, tuple[LoadComparison, ...]]
-    joint: Mapping[str, Mapping[str, BoundedEstimate]]
+    joint: Joint
     dry_against_lubricated: tuple[DryAgainstLubricated, ...] = ()
     interface: InterfaceComparison | None = None
-    macroscopic: tuple[float, float | None] | None = None
+    macroscopic: Macroscopic | None = None
     checks: tuple[QualityCheck, ...] = ()
     messages: tuple[Message, ...] = ()
     shear: ApparatusFunction | None = None

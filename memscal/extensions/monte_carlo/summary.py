@@ -1,8 +1,7 @@
 """Monte Carlo draws of a calibration as a table, a mapping and a data frame."""
 
-from typing import Any
-
 from memscal.extensions.monte_carlo.monte_carlo import BudgetComparison, MonteCarlo
+from memscal.model.arrays import Values
 from memscal.model.quantities import estimated_quantity
 from memscal.summaries.declared import DataFrame, plain
 from memscal.summaries.table import Table, texts_of
@@ -38,7 +37,7 @@ def tables(result: MonteCarlo) -> list[Table]:
     return [Table(title, head, rows, disagreeing)]
 
 
-def mapping(result: MonteCarlo) -> dict[str, Any]:
+def mapping(result: MonteCarlo) -> Values:
     """Return the comparison of every parameter."""
     return {
         "draws": result.draws,
@@ -50,7 +49,7 @@ def mapping(result: MonteCarlo) -> dict[str, Any]:
     }
 
 
-def _comparison_json(comparison: BudgetComparison, result: MonteCarlo) -> dict[str, Any]:
+def _comparison_json(comparison: BudgetComparison, result: MonteCarlo) -> Values:
     quantity = estimated_quantity(comparison.name).read_in(result.reading)
     values = {}
     for name, number in vars(comparison).items():

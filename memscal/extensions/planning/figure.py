@@ -1,7 +1,5 @@
 """Figure of a planned scan: expected G, its transfer function, uncertainties along a variation."""
 
-from typing import Any
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -22,6 +20,7 @@ from memscal.figures.style import (
     on_axis,
     panels_of,
 )
+from memscal.model.arrays import Values
 from memscal.model.quantities import MM, PER_MM, PER_MM2
 
 #: G is drawn to this many Gaussian widths, its transform to this many resolved bands.
@@ -91,7 +90,7 @@ def _draw_varied(axes: Axes, planned: Design, vary: str) -> None:
         total = np.array([varied.relative_uncertainty(name) for varied in designs])
         noise = np.array([varied.budget[name]["noise"] for varied in designs])
         noise /= np.abs([varied.parameters[name] for varied in designs])
-        look: dict[str, Any] = {"color": colour, "marker": marker, "ms": 3}
+        look: Values = {"color": colour, "marker": marker, "ms": 3}
         axes.plot(along, 100 * EXPANDED * total, label=symbol, **look)
         axes.plot(along, 100 * EXPANDED * noise, ls="--", mfc="none", **look)
     axes.plot([], [], color="0.4", ls="--", label="noise alone")

@@ -1,9 +1,9 @@
 """A planned scan as tables, mapping and arrays, as ``memscal design`` prints it."""
 
 import math
-from typing import Any
 
 from memscal.extensions.planning.design import Design
+from memscal.model.arrays import Values
 from memscal.model.quantities import ESTIMATED, MM, MV, PER_MM, PER_MM2, Quantity, measured
 from memscal.model.records import RADIAL, TRANSFER
 from memscal.summaries import declared
@@ -106,7 +106,7 @@ def _contributions_table(planned: Design) -> Table:
     return Table("Contributions, in percent", head, rows)
 
 
-def mapping(planned: Design) -> dict[str, Any]:
+def mapping(planned: Design) -> Values:
     """Return the object of ``design --json``; the contract fixes its form."""
     axis = {"g_at_axis": planned.g[0], "g_at_axis_uncertainty": planned.g_errors[0]}
     wanted = {}
@@ -141,6 +141,6 @@ def frame(planned: Design) -> declared.DataFrame:
     return declared.data_frame(_QUANTITIES[:3], vars(planned))
 
 
-def correlated(planned: Design) -> dict[str, Any]:
+def correlated(planned: Design) -> Values:
     """Return the expected parameters with their joint covariance."""
     return declared.correlated_parameters(planned.parameters)

@@ -1,6 +1,5 @@
 """HDF5 files of other programs: plain datasets by their paths, or what an NXdata plots."""
 
-from collections.abc import Mapping
 from typing import Any
 
 from memscal.errors import FormatError, InputError
@@ -8,12 +7,13 @@ from memscal.extensions.recorded.columns import RecordedColumns
 from memscal.formats.files import FilePath
 from memscal.formats.hdf5.reader import SafeFile, open_hdf5
 from memscal.formats.hdf5.writer import SCHEMA_ATTRIBUTE
+from memscal.model.arrays import Values
 
 #: Groups that @default leads through: that of the file, of its entry, and of a part of it.
 _MOST_DEFAULTS = 3
 
 
-def open_datasets(path: FilePath, named: Mapping[str, Any], **reading: Any) -> RecordedColumns:
+def open_datasets(path: FilePath, named: Values, **reading: Any) -> RecordedColumns:
     """Read the datasets that are named; where x, y and u are not, signal and axis of the NXdata."""
     with open_hdf5(path) as file:
         schema = file.attribute("/", SCHEMA_ATTRIBUTE)

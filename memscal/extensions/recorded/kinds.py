@@ -1,7 +1,6 @@
 """Kinds of recorded files, told by what they begin with, and the table of each."""
 
 import re
-from collections.abc import Mapping
 from contextlib import suppress
 from typing import Any
 
@@ -11,6 +10,7 @@ from memscal.extensions.recorded.spec import SpecScan
 from memscal.extensions.recorded.tdms import open_channels
 from memscal.formats.files import FilePath, read_pieces
 from memscal.formats.tables.columns import NamedColumns
+from memscal.model.arrays import Values
 from memscal.model.sizes import MOST_TABLE_BYTES
 
 _BEGINNINGS = {b"\x89HDF\r\n\x1a\n": "HDF5 file", b"TDSm": "TDMS file"}
@@ -28,9 +28,7 @@ def kind_of_record(path: FilePath) -> str:
     return "SPEC file" if _SCAN.search(begin) else "text"
 
 
-def open_record(
-    kind: str, path: FilePath, named: Mapping[str, Any], **reading: Any
-) -> NamedColumns:
+def open_record(kind: str, path: FilePath, named: Values, **reading: Any) -> NamedColumns:
     """Open a file of a kind; ``named`` are the columns of a scan that are asked for."""
     if kind == "HDF5 file":
         return open_datasets(path, named, **reading)

@@ -4,7 +4,7 @@ import hashlib
 import io
 import logging
 import struct
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import PurePath
 from typing import Any
@@ -17,6 +17,7 @@ from memscal.formats.files import FilePath, damage_named, read_bytes
 from memscal.formats.tables.dialect import cut_head
 from memscal.formats.tables.sheets import installed
 from memscal.formats.units import is_unit
+from memscal.model.arrays import Values
 from memscal.model.provenance import SourceFile
 from memscal.model.sizes import too_large
 
@@ -34,12 +35,12 @@ _TIME = "wf_increment"
 _DEFRAGMENT = "Get the file again, or let LabVIEW defragment it (TDMS Defragment)."
 
 
-def open_channels(path: FilePath, named: Mapping[str, Any], **reading: Any) -> RecordedColumns:
+def open_channels(path: FilePath, named: Values, **reading: Any) -> RecordedColumns:
     """Open the channels by group/channel; the waveform of the readings makes a column of times."""
     name = PurePath(path).name
     data = read_bytes(path)
     nptdms = installed("nptdms", "A TDMS file", "recorded")
-    channels: dict[str, Any] = {}
+    channels: Values = {}
     with damage_named(f"{name} cannot be read as TDMS"), _warnings_refused():
         _require_whole(name, data)
         file = nptdms.TdmsFile.open(io.BytesIO(data))
@@ -121,13 +122,13 @@ def _unit_of(channel: Any) -> str:
     return unit if is_unit(unit) else unit.lower()  # Volts
 
 
-def _time_step(properties: Mapping[str, Any]) -> float:
+def _time_step(properties: Values) -> float:
     """Return the time between readings, in s; 0 where a waveform states none."""
     timed = properties.get("wf_xunit_string") in (None, "", "s")
     return float(properties.get(_TIME, 0.0)) if timed else 0.0
 
 
-def _require_one_clock(name: str, channels: Mapping[str, Any]) -> None:
+def _require_one_clock(name: str, channels: Values) -> None:
     """Refuse channels that were not sampled together: their rows do not belong together."""
     steps = {column: channel.properties.get(_TIME) for column, channel in channels.items()}
     lengths = {column: len(channel) for column, channel in channels.items()}
