@@ -197,9 +197,8 @@ def _solve(path: LoadingPath, k: FloatArray) -> Arrays:
     def spectra_of(group: int, k: FloatArray) -> FloatArray:
         """Spectra at the loads, or at a group of their neighbours."""
         some = contacts[group * loads.size : (group + 1) * loads.size]
-        if path.order:
-            return np.array([contact.base_shear_spectrum(k) for contact in some])
-        return np.array([contact.base_spectrum(k) for contact in some])
+        spectrum = Contact.base_shear_spectrum if path.order else Contact.base_spectrum
+        return np.array([spectrum(contact, k) for contact in some])
 
     spectra = spectra_of(0, k)
     by_load = np.zeros_like(spectra)

@@ -24,7 +24,7 @@ from scipy.linalg import block_diag
 from scipy.special import j0, j1, logsumexp
 
 from memscal.apparatus import ApparatusFunction
-from memscal.axisymmetry.hankel import Wavenumbers
+from memscal.axisymmetry.hankel import Wavenumbers, bessel
 from memscal.errors import InputError
 from memscal.friction.family import ProfileFamily
 from memscal.friction.marginal_likelihood import Statistics, added, log_likelihood
@@ -287,16 +287,13 @@ def predict(points: LoadPoints, sensor: Sensor, members: ProfileFamily, load: in
     # Repeats share the transforms at their distance from the centre.
     radius, place = np.unique(points.radius, return_inverse=True)
     phase = np.outer(radius, k)
+    kernel = bessel(sensor.order, phase)
+    derivative = -j1(phase)
     if sensor.order:
-        # The component of a vector along the scan changes its sign with the side of the centre.
-        sign = np.sign(points.offset)
-        kernel = j1(phase)
         ratio = np.divide(kernel, phase, out=np.full_like(phase, 0.5), where=phase > 0)
         derivative = j0(phase) - ratio
-    else:
-        sign = np.ones(points.offset.size)
-        kernel = j0(phase)
-        derivative = -j1(phase)
+    # The component of a vector along the scan changes its sign with the side of the centre.
+    sign = np.sign(points.offset) ** sensor.order
 
     def at_points(spectra: FloatArray, kernel: FloatArray = kernel * weights) -> FloatArray:
         """Inverse transforms (V, n) of spectra (V, K)."""

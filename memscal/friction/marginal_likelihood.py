@@ -74,13 +74,11 @@ def evidence_of_each(
 
     loads = _compressed(loads)
     steps = len(loads) - 1
-    paths = _PATHS if steps else 1
-    if steps:
-        # Without scrambling the first point is 0: it is moved into the middle of its cell.
-        draws = Sobol(steps, scramble=False).random(paths) + 0.5 / paths
-    drawn = Statistics(*(np.zeros((paths, *array.shape[1:])) for array in loads[0]))
-    logs = np.zeros(paths)
-    before = np.zeros(paths)
+    # Without scrambling the first point is 0: it is moved into the middle of its cell.
+    draws = Sobol(steps, scramble=False).random(_PATHS) + 0.5 / _PATHS
+    drawn = Statistics(*(np.zeros((_PATHS, *array.shape[1:])) for array in loads[0]))
+    logs = np.zeros(_PATHS)
+    before = np.zeros(_PATHS)
     for step, (load, weight) in enumerate(zip(loads, weights, strict=True)):
         both = added([drawn.at(np.s_[:, None]), load])
         with np.errstate(divide="ignore"):
@@ -92,10 +90,10 @@ def evidence_of_each(
         cumulated = np.cumsum(np.exp(joint - expected[:, None]), axis=1)
         nodes = (cumulated < draws[:, step, None] * cumulated[:, -1:]).sum(axis=1)
         nodes = np.minimum(nodes, weight.size - 1)
-        drawn = both.at((np.arange(paths), nodes))
+        drawn = both.at((np.arange(_PATHS), nodes))
         before = log_likelihood(drawn)[0]
-    mean = float(logsumexp(logs)) - math.log(paths)
-    return mean, float(np.std(np.exp(logs - mean)) / np.sqrt(paths))
+    mean = float(logsumexp(logs)) - math.log(_PATHS)
+    return mean, float(np.std(np.exp(logs - mean)) / np.sqrt(_PATHS))
 
 
 def _compressed(loads: Sequence[Statistics]) -> list[Statistics]:
