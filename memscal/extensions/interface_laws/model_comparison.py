@@ -251,27 +251,19 @@ class LawCurve:
 def curve(channel: Channel, *, also: Iterable[float] = (), fine: int = _FINE) -> LawCurve:
     """Return the likelihood along the parameter of a family, one for all loads of a channel."""
     family = channel.family
-    first = family.coordinates[0]
-    last = family.coordinates[-1]
     # Nodes are even in the bounded coordinate, closer where it matters.
-    extra = bounded([*also], family.scale)
-    coarse = np.unique([*np.linspace(first, last, _COARSE), *extra])
+    even = np.linspace(*family.coordinates[[0, -1]], _COARSE)
+    coarse = np.union1d(even, bounded([*also], family.scale))
     rough = likelihood(channel.at(unbounded(coarse, family.scale))).statistics
     fall = log_likelihood(rough)[0]
     near = np.flatnonzero(2 * (fall.max() - fall) < _EXCLUDED)
     low = coarse[max(near[0] - 1, 0)]
     high = coarse[min(near[-1] + 1, coarse.size - 1)]
-    between = np.setdiff1d(np.linspace(low, high, fine), coarse)
-    close = likelihood(channel.at(unbounded(between, family.scale))).statistics
-    both = np.concatenate([coarse, between])
-    order = np.argsort(both)
-    pairs = zip(rough, close, strict=True)
-    statistics = Statistics(*(np.concatenate(pair)[order] for pair in pairs))
-    t = both[order]
-    middles = (t[1:] + t[:-1]) / 2
-    ends = np.array([t[0], *middles, t[-1]])
+    t = np.union1d(coarse, np.linspace(low, high, fine))
     values = unbounded(t, family.scale)
-    edges = unbounded(ends, family.scale)
+    statistics = likelihood(channel.at(values)).statistics
+    middles = (t[1:] + t[:-1]) / 2
+    edges = unbounded([t[0], *middles, t[-1]], family.scale)
     return LawCurve(values, t, edges, statistics, *log_likelihood(statistics))
 
 
@@ -344,7 +336,7 @@ def implied_friction(
     """Return what a slip length and its interval mean at each load, read from the maximum."""
     order = np.argsort(rigid.family.loads, kind="stable")
     lengths = np.array([length.interval.low, length.best, length.interval.upper])
-    t = np.linspace(rigid.family.coordinates[0], rigid.family.coordinates[-1], _NODES)
+    t = np.linspace(*rigid.family.coordinates[[0, -1]], _NODES)
     values = unbounded(t, rigid.family.scale)
     curves = _maxima(rigid, values)
     maxima = _maxima(slipping, lengths)
