@@ -252,7 +252,7 @@ def curve(channel: Channel, *, also: Iterable[float] = (), fine: int = _FINE) ->
     """Return the likelihood along the parameter of a family, one for all loads of a channel."""
     family = channel.family
     # Nodes are even in the bounded coordinate, closer where it matters.
-    even = np.linspace(*family.coordinates[[0, -1]], _COARSE)
+    even = np.linspace(family.coordinates[0], family.coordinates[-1], _COARSE)
     coarse = np.union1d(even, bounded([*also], family.scale))
     rough = likelihood(channel.at(unbounded(coarse, family.scale))).statistics
     fall = log_likelihood(rough)[0]
@@ -336,7 +336,7 @@ def implied_friction(
     """Return what a slip length and its interval mean at each load, read from the maximum."""
     order = np.argsort(rigid.family.loads, kind="stable")
     lengths = np.array([length.interval.low, length.best, length.interval.upper])
-    t = np.linspace(*rigid.family.coordinates[[0, -1]], _NODES)
+    t = np.linspace(rigid.family.coordinates[0], rigid.family.coordinates[-1], _NODES)
     values = unbounded(t, rigid.family.scale)
     curves = _maxima(rigid, values)
     maxima = _maxima(slipping, lengths)
