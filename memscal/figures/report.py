@@ -37,7 +37,7 @@ from memscal.summaries.calibration import (
     explanations_table,
     sensor_title,
 )
-from memscal.summaries.declared import total_of
+from memscal.summaries.declared import cell, total_of
 from memscal.summaries.stress import contact_words
 from memscal.summaries.table import CHECKS, Table, checks_table, stated_text, verdict, worst_checks
 from memscal.version import __version__
@@ -201,7 +201,8 @@ def _calibration_report(result: Calibration | ApparatusFunction) -> Report:
 @report_of.register
 def _stress_report(stress: MeasuredStress) -> Report:
     largest = max(stress.profiles, key=lambda profile: profile.maximum)
-    top = format_measured(largest.maximum / KPA, largest.maximum_uncertainty / KPA, "kPa")
+    quantities = by_name(records.STRESS_NUMBERS.quantities)
+    top = cell(quantities["maximum"], largest)
     alt = (
         f"Stress against the distance from the centre, {len(stress.profiles)} profiles on a "
         f"linear and a logarithmic scale. The largest, at {largest.label}, has a maximum of {top}."
@@ -211,7 +212,6 @@ def _stress_report(stress: MeasuredStress) -> Report:
         "it; ticks at the top: the radius of the contact without friction. b: the same on a "
         "logarithmic scale, pale where the stress is not distinct from zero."
     )
-    quantities = by_name(records.STRESS_NUMBERS.quantities)
     budgets = []
     for i, p in enumerate(stress.profiles, start=1):
         label = f"{i}: {p.label}, "
@@ -330,12 +330,9 @@ def _stated(prefix: str, record: Record, holder: object) -> Iterator[tuple[str, 
         if isinstance(value, str) and value:
             yield prefix + quantity.words, value
         elif isinstance(value, float) and not quantity.name.endswith("_uncertainty"):
-            value = value / quantity.scale
-            text = f"{value:.3g} {quantity.unit}".strip()
-            spread = f"{quantity.name}_uncertainty"
-            if hasattr(holder, spread):
-                u = getattr(holder, spread)
-                text = format_measured(value, u and u / quantity.scale, quantity.unit)
+            text = f"{value / quantity.scale:.3g} {quantity.unit}".strip()
+            if hasattr(holder, f"{quantity.name}_uncertainty"):
+                text = cell(quantity, holder)
             yield prefix + quantity.words, text
 
 
