@@ -10,9 +10,8 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
-from contextlib import ExitStack
 from dataclasses import asdict, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import chain
 from typing import Any
 
@@ -38,7 +37,7 @@ from memscal.model.arrays import (
 )
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Indenter, Sphere
-from memscal.parallel import require_workers, worker_pool
+from memscal.parallel import require_workers, shared
 from memscal.progress import Task
 from memscal.version import __version__
 
@@ -389,14 +388,9 @@ class FamilySetup:
     def _solved(self, groups: Sequence[Sequence[LoadingPath]]) -> list[Arrays]:
         """Solve groups of paths, each path once, in one or more processes; stack each group."""
         distinct = list(dict.fromkeys(chain.from_iterable(groups)))
-        processes = min(self.workers, len(distinct))
         task = Task("contacts", sum(len(path.loads) for path in distinct))
-        with ExitStack() as stack:
-            solve: Any = map
-            if processes > 1:
-                solve = stack.enter_context(worker_pool(processes)).map
-            found = solve(_solve, distinct, [self.wavenumbers.k] * len(distinct))
-            arrays = list(task.counted(found, lambda numbers: numbers["depths"].size))
+        found = shared(partial(_solve, k=self.wavenumbers.k), distinct, workers=self.workers)
+        arrays = list(task.counted(found, lambda numbers: numbers["depths"].size))
         solved = dict(zip(distinct, arrays, strict=True))
         stacks = []
         for group in groups:
