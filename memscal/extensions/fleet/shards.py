@@ -14,6 +14,7 @@ import numpy as np
 from memscal.errors import FormatError, InputError, MemscalError
 from memscal.extensions.fleet.results import FleetResults
 from memscal.formats.files import HDF5_SUFFIXES, atomic_write_bytes, read_bytes
+from memscal.formats.tables.sheets import installed
 from memscal.model.apparatus import ApparatusData
 from memscal.model.arrays import FloatArray, Values, value_record
 from memscal.model.checks import OVERRIDE, Message
@@ -131,14 +132,10 @@ _CHECK = ("value", "limit", "p_value")
 
 def arrow() -> Any:
     """Return the module pyarrow, or say how to get it."""
-    try:
-        import pyarrow.parquet
-    except ModuleNotFoundError as error:
-        raise MemscalError(
-            "pyarrow, which writes Parquet, is not installed.",
-            cure='Install it with the extra "fleet": pip install "memscal[fleet]".',
-        ) from error
-    return pyarrow
+    installed("pyarrow.parquet", "A table of results", "fleet")
+    import pyarrow as pa
+
+    return pa
 
 
 def _schema(readings: Iterable[Reading]) -> Any:

@@ -6,7 +6,6 @@ memory, a copy without a name, and returns plain arrays, never pickles.
 
 import contextlib
 import hashlib
-import importlib.util
 import io
 import json
 import os
@@ -25,6 +24,7 @@ from numpy.typing import NDArray
 from memscal.errors import FormatError, InputError, OutputError, UnsafeFileError
 from memscal.formats.files import FilePath, atomic_write_bytes, damage_named, read_bytes
 from memscal.formats.hdf5.reader import open_hdf5
+from memscal.formats.tables.sheets import installed
 from memscal.formats.units import from_si
 from memscal.model.arrays import Arrays, FloatArray, IndexArray, Values, array_record, floats
 from memscal.model.field_mesh import FieldMesh
@@ -237,7 +237,7 @@ def read_mesh(path: FilePath) -> Mesh:
             cure="Save it as .vtu from the program that wrote it or from ParaView, or export the "
             "stress at the base as a table (CSV).",
         )
-    _require_meshio()
+    installed("meshio", "A mesh", "fem-io")
     data = read_bytes(shown)
     if not data:
         raise FormatError(f"{name} is empty.", cure="Save the mesh again.")
@@ -249,14 +249,6 @@ def read_mesh(path: FilePath) -> Mesh:
     with damage_named(f"{name} cannot be read as a mesh", why="Its reader gave no mesh back"):
         header, arrays = run_meshio(data, _KINDS[ending], name, heavy)
         return _checked(header, arrays, tuple(sources), tensor_order=_KINDS[ending] != "xdmf")
-
-
-def _require_meshio() -> None:
-    if importlib.util.find_spec("meshio") is None:
-        raise InputError(
-            "Meshes are read and written with meshio, which is not installed.",
-            cure='Install it with: pip install "memscal[fem-io]"',
-        )
 
 
 def _checked(
@@ -327,9 +319,7 @@ def _unusable(source: SourceFile, content: str) -> FormatError:
 def write_mesh(mesh: FieldMesh, path: FilePath, *, overwrite: bool = False) -> None:
     """Write displacement and stress on a mesh as a VTU file, whole or not at all."""
     # x is the radius and y the height, in mm; stress_Pa is in VTK's order, tension positive.
-    _require_meshio()
-    import meshio
-
+    meshio = installed("meshio", "A mesh", "fem-io")
     points, unit = from_si(np.pad(mesh.points, ((0, 0), (0, 1))), "length")
     moved, _ = from_si(np.pad(mesh.displacement, ((0, 0), (0, 1))), "length")
     stress = np.pad(mesh.stress, ((0, 0), (0, 2)))

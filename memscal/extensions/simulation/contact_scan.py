@@ -12,10 +12,10 @@ from memscal.extensions.simulation.rod_scan import PAPER_FILM
 from memscal.extensions.simulation.sensor import (
     Truth,
     blurred_stress,
-    checked_loads,
     simulated_scan,
     simulated_sensor,
 )
+from memscal.friction.family import require_loads
 from memscal.mechanics.contact import Contact
 from memscal.mechanics.indent import indent
 from memscal.mechanics.interface import Interface
@@ -54,7 +54,7 @@ def simulate_contacts(
     seed: int = 0,
 ) -> Scan:
     """Simulate a line scan of contacts of a sphere; ``load_scale``: all true loads over stated."""
-    loads = checked_loads(load)
+    loads = require_loads(load)
     _require_row(loads, points, spacing, repeats, seed)
     require_positive("load_scale", load_scale)
     sensor = simulated_sensor(kernel, conversion_constant, shear)

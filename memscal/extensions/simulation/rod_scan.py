@@ -17,10 +17,10 @@ from memscal.extensions.simulation.disturbances import (
 )
 from memscal.extensions.simulation.sensor import (
     blurred_stress,
-    checked_loads,
     simulated_scan,
     simulated_sensor,
 )
+from memscal.friction.family import require_loads
 from memscal.mechanics.press_rod import press_rod
 from memscal.model.arrays import FloatArray, require_non_negative, require_range
 from memscal.model.film import LINEAR, NEO_HOOKEAN, ElasticFilm
@@ -121,7 +121,7 @@ def simulate(
     if points < 2 or repeats < 1:
         raise InputError("A scan needs two positions and one repeat at least.")
     sensor = simulated_sensor(kernel, conversion_constant, shear)
-    loads = checked_loads(load)
+    loads = require_loads(load)
     if raster and loads.size * repeats > 1:
         raise InputError("A raster has one repeat at one load.", cure="Simulate several rasters.")
     film = replace(film, law=film.law or LINEAR)

@@ -10,7 +10,7 @@ from memscal.axisymmetry.kernels import GaussianMixture, RadialKernel
 from memscal.errors import InputError
 from memscal.extensions.simulation.disturbances import Disturbances, Shear
 from memscal.mechanics.contact import Contact
-from memscal.model.arrays import Arrays, FloatArray, Values, floats, require_positive, value_record
+from memscal.model.arrays import Arrays, FloatArray, Values, require_positive, value_record
 from memscal.model.instrument import StressSensor
 from memscal.model.scan import Scan
 
@@ -37,16 +37,6 @@ def apparatus_function(kernel: RadialKernel | None) -> RadialKernel:
             cure="Divide the kernel by its integral; the conversion constant carries the size.",
         )
     return kernel
-
-
-def checked_loads(load: float | Sequence[float]) -> FloatArray:
-    """Return one load or several, in N, as a flat array; refuse none, and one not positive."""
-    loads = np.atleast_1d(floats(load))
-    if loads.ndim != 1 or loads.size == 0:
-        raise InputError("The list of loads is empty.", cure="Give one load or several, in N.")
-    for value in loads:
-        require_positive("load", value, "N")
-    return loads
 
 
 def blurred_stress(

@@ -62,7 +62,7 @@ def test_a_scan_is_that_of_its_contacts_at_the_nominal_loads():
 @pytest.mark.parametrize(
     ("options", "error", "problem"),
     [
-        ({"load": []}, InputError, "list of loads is empty"),
+        ({"load": []}, InputError, "loads has shape"),
         ({"load": [0.3, 0.3]}, InputError, "given twice"),
         ({"load": 1e12}, DomainError, "load|film"),
         ({"points": 1}, InputError, "two contacts"),
