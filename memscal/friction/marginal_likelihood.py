@@ -15,14 +15,14 @@ determinants.  A law with one parameter of each load is therefore integrated loa
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from scipy.special import logsumexp
 
 from memscal.friction.family import bounded
-from memscal.model.arrays import ArrayPair, FloatArray
+from memscal.model.arrays import ArrayFunction, ArrayPair, FloatArray
 
 #: Paths through the loads along which a parameter of each load is drawn: a power of two.
 _PATHS = 256
@@ -109,7 +109,7 @@ def _compressed(loads: Sequence[Statistics]) -> list[Statistics]:
     ]
 
 
-Prior: TypeAlias = Callable[[FloatArray], FloatArray]
+Prior: TypeAlias = ArrayFunction
 """The share of a prior below values of a parameter that is not negative."""
 
 

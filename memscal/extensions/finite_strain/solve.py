@@ -35,7 +35,7 @@ from memscal.mechanics.film_response import RingTraction
 from memscal.mechanics.solver.refinement import RingRequest, relative_change
 from memscal.mechanics.solver.step import Depth, Load, Target
 from memscal.mechanics.surface import anticlockwise, on_hats
-from memscal.model.arrays import FloatArray, array_record, value_record
+from memscal.model.arrays import ArrayFunction, FloatArray, array_record, value_record
 from memscal.model.field_mesh import FieldMesh
 from memscal.model.film import MOONEY_RIVLIN, NEO_HOOKEAN, ElasticFilm
 from memscal.model.indenter import Rod, Sphere
@@ -427,6 +427,6 @@ def _spline_masses(r: FloatArray, order: int) -> FloatArray:
     return _without_axis(hats @ (splines * (2 * np.pi * nodes * weights)[:, None]))
 
 
-def _within(end: float, spline: Callable[[FloatArray], FloatArray], r: FloatArray) -> FloatArray:
+def _within(end: float, spline: ArrayFunction, r: FloatArray) -> FloatArray:
     """Return a spline's values at ``r``, zero beyond its end."""
     return np.where(r <= end, spline(np.minimum(r, end)), 0.0)
