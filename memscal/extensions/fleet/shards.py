@@ -132,10 +132,10 @@ _CHECK = ("value", "limit", "p_value")
 
 def arrow() -> Any:
     """Return the module pyarrow, or say how to get it."""
-    installed("pyarrow.parquet", "A table of results", "fleet")
-    import pyarrow as pa
+    installed("pyarrow", "A table of results", "fleet")
+    import pyarrow.parquet
 
-    return pa
+    return pyarrow
 
 
 def _schema(readings: Iterable[Reading]) -> Any:
