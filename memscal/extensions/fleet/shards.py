@@ -297,6 +297,8 @@ _NUMBERS = (
     "wafer_x",
     "wafer_y",
 )
+#: What makes scans alike.
+_SETTINGS = ("options_sha256", "version", "unit", "messages", "input_sha256")
 _SUMMARISED = (
     *_NUMBERS,
     "path",
@@ -304,11 +306,7 @@ _SUMMARISED = (
     "error_class",
     "error",
     "checks",
-    "unit",
-    "messages",
-    "input_sha256",
-    "options_sha256",
-    "version",
+    *_SETTINGS,
 )
 
 
@@ -336,8 +334,7 @@ class _Statements:
             self.failed[number] = tuple(check["name"] for check in checks if not check["passed"])
             if row["error"]:
                 self.errors[number] = (row["error_class"], row["error"])
-        names = ("options_sha256", "version", "unit", "messages", "input_sha256")
-        columns = [table[name].to_pylist() for name in names]
+        columns = [table[name].to_pylist() for name in _SETTINGS]
         for number, row in enumerate(zip(*columns, strict=True), start):
             options, version, unit, messages, digest = row
             self.settings.setdefault((options, version), number)
