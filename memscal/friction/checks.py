@@ -9,7 +9,7 @@ from scipy.special import chdtrc
 from memscal.friction.effective import EXPANDED, HALF_NORMAL_MEAN
 from memscal.friction.family import ProfileFamily
 from memscal.friction.likelihood import LUBRICATED_FRICTION
-from memscal.friction.results import BoundedEstimate, ByLoading, Joint, LoadComparison, Macroscopic
+from memscal.friction.results import BoundedEstimate, ByLoading, Joint, LoadComparison
 from memscal.model import checks as quality
 from memscal.model.checks import Message, QualityCheck, check, chi_square_limit
 from memscal.model.measured_stress import MeasuredStress
@@ -106,7 +106,7 @@ def comparison_messages(
     families: Mapping[str, ProfileFamily],
     joint: Joint,
     checks: tuple[QualityCheck, ...],
-    macroscopic: Macroscopic | None,
+    macroscopic: tuple[float, float | None] | None,
 ) -> tuple[Message, ...]:
     """Return the messages of a comparison and of its measured stress, failed checks first."""
     messages = [
@@ -174,7 +174,7 @@ def _loadings(joint: Joint) -> Iterator[Message]:
 
 def _against_macroscopic(
     joint: Joint,
-    macroscopic: Macroscopic | None,
+    macroscopic: tuple[float, float | None] | None,
 ) -> Iterator[Message]:
     """Say how the effective coefficients stand against the macroscopic one."""
     if macroscopic is None:

@@ -27,7 +27,7 @@ from memscal.friction.likelihood import (
     require_line,
     sensor_of,
 )
-from memscal.friction.results import FrictionComparison, Joint, LoadComparison, Macroscopic
+from memscal.friction.results import FrictionComparison, Joint, LoadComparison
 from memscal.measurement.measure_stress import joined_stress, measure_stress
 from memscal.measurement.posterior import common_inputs
 from memscal.measurement.restore import accept_other_sensor, load_of, single_loads
@@ -414,7 +414,7 @@ def compare_measured(
     between_scan_gain: float = BETWEEN_SCAN_GAIN,
     shear: ApparatusFunction | None = None,
     shear_families: Mapping[str, ProfileFamily] | None = None,
-    macroscopic: Macroscopic | None = None,
+    macroscopic: tuple[float, float | None] | None = None,
 ) -> FrictionComparison:
     """Compare measured stress with families by loading, which hold every measured load."""
     channels = channels_of(measured, apparatus, families, (), between_scan_gain)

@@ -145,8 +145,6 @@ class BoundedEstimate:
 ByLoading = Mapping[str, BoundedEstimate]
 Joint = Mapping[str, ByLoading]
 """Coefficients of all loads together, by lubrication and loading."""
-Macroscopic = tuple[float, float | None]
-"""A friction coefficient that was measured otherwise, and its standard uncertainty."""
 
 
 def _rounded(value: float, low: float, high: float) -> str:
@@ -287,10 +285,10 @@ class FrictionComparison(Result, Checked):
     measured: MeasuredStress
     friction: FloatArray
     loads: Mapping[str, tuple[LoadComparison, ...]]
-    joint: Joint
+    joint: Mapping[str, Mapping[str, BoundedEstimate]]
     dry_against_lubricated: tuple[DryAgainstLubricated, ...] = ()
     interface: InterfaceComparison | None = None
-    macroscopic: Macroscopic | None = None
+    macroscopic: tuple[float, float | None] | None = None
     checks: tuple[QualityCheck, ...] = ()
     messages: tuple[Message, ...] = ()
     shear: ApparatusFunction | None = None

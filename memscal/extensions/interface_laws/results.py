@@ -4,7 +4,7 @@ from dataclasses import field
 
 from scipy.special import chdtrc
 
-from memscal.friction.results import BoundedEstimate, Macroscopic
+from memscal.friction.results import BoundedEstimate
 from memscal.model.arrays import FloatArray, array_record, value_record
 from memscal.model.bayes_factor import POSITIVE, BayesFactor
 from memscal.model.checks import Message
@@ -105,7 +105,7 @@ class InterfaceComparison(Result):
     True
     """
 
-    macroscopic: Macroscopic
+    macroscopic: tuple[float, float | None]
     tangential: LawComparison | None
     normal: LawComparison | None
     messages: tuple[Message, ...] = field(default=())
