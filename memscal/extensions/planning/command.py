@@ -1,6 +1,7 @@
 """``memscal design``: the uncertainties to expect of a scan that is not made yet."""
 
 from functools import partial
+from inspect import signature
 from pathlib import Path
 from typing import Any
 
@@ -27,23 +28,6 @@ from memscal.cli.options import (
     si,
 )
 from memscal.formats.files import together
-
-_AS_GIVEN = (
-    "conversion_constant",
-    "step",
-    "half_range",
-    "noise_voltage",
-    "centre",
-    "line_offset_uncertainty",
-    "load_uncertainty",
-    "noise",
-    "position_scale_uncertainty",
-    "load",
-    "repeats",
-    "method",
-    "rod_friction",
-    "roundness_uncertainty",
-)
 
 EXAMPLES = """\b
 Examples:
@@ -136,7 +120,7 @@ def command(
 
     from memscal.extensions.planning.design import design
 
-    settings: dict[str, Any] = {name: options[name] for name in _AS_GIVEN}
+    settings = {name: options[name] for name in signature(design).parameters if name in options}
     settings["rod"] = indenter_from("rod", options)
     with out.working("Planning"):
         planned = design(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -97,31 +97,14 @@ _sphere_options(_SPHERE)
 _SPHERE_NAMES = [each.name for each in _SPHERE.params]
 """The options that only an experiment with a sphere has."""
 
-_AS_GIVEN = (
-    "noise",
-    "baseline",
-    "drift",
-    "load_uncertainty",
-    "load_scatter",
-    "position_error",
-    "state_noise",
-    "state_law",
-    "record_loads",
-    "draw_inputs",
-    "one_load_cell",
-    "gain",
-    "thickness_factor",
-)
-
 
 def _shared_settings(options: Options) -> dict[str, Any]:
     """Return what describes a rod scan and an experiment alike."""
     from memscal.extensions.simulation.disturbances import Disturbances
 
-    disturbances = Disturbances(
-        centre=(options["centre"], options["centre_y"]),
-        **{name: options[name] for name in _AS_GIVEN},
-    )
+    names = [item.name for item in fields(Disturbances) if item.name in options]
+    stated = {name: options[name] for name in names}
+    stated["centre"] = (options["centre"], options["centre_y"])
     return {
         "film": film_from(options),
         "rod": indenter_from("rod", options),
@@ -129,7 +112,7 @@ def _shared_settings(options: Options) -> dict[str, Any]:
         "kernel": kernel_from(options),
         "conversion_constant": options["conversion_constant"],
         "repeats": options["repeats"],
-        "disturbances": disturbances,
+        "disturbances": Disturbances(**stated),
         "seed": options["seed"],
     }
 
@@ -303,13 +286,9 @@ def _check_usage(experiment: str, options: Options) -> None:
     context = click.get_current_context()
     typed = ParameterSource.COMMANDLINE
     others = _SPHERE_NAMES if experiment == "rod" else _ROD_NAMES
-    misplaced = [name for name in others if context.get_parameter_source(name) == typed]
-    if misplaced:
-        names = [
-            option.opts[0]
-            for option in context.command.params
-            if isinstance(option, click.Option) and option.name in misplaced
-        ]
+    given = [name for name in others if context.get_parameter_source(name) == typed]
+    names = [param.opts[0] for param in context.command.params if param.name in given]
+    if names:
         other = "sphere" if experiment == "rod" else "rod"
         belongs = "belongs" if len(names) == 1 else "belong"
         raise click.UsageError(f"{', '.join(names)} {belongs} to --experiment {other}.")
