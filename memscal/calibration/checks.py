@@ -31,7 +31,6 @@ from memscal.estimation.runs import compare_runs, hysteresis_test
 from memscal.estimation.slow_noise import slow_noise
 from memscal.mechanics.press_rod import press_rod
 from memscal.model.apparatus import ParameterSet
-from memscal.model.arrays import IndexArray
 from memscal.model.assumptions import Assumption
 from memscal.model.checks import (
     FALSE_ALARM,
@@ -117,8 +116,14 @@ def _reconvolutions(solution: Solution) -> _Checks:
     p_value = None
     if solution.estimate.points.u_errors is not None:
         p_value = float(chdtrc(fitted.degrees, fitted.chi2_reduced * fitted.degrees))
-    # Both are of the same points.
-    limit = _misfit_limit(solution.estimate, fitted.degrees)
+    # Both are of the same points; the noise is stated, or is known by degrees of its own.
+    limit = chi_square_limit(fitted.degrees)
+    noise = solution.estimate.raster_noise
+    if noise is not None:
+        # What the noise was estimated from is a part of the misfit: the rest of it is independent.
+        rest = max(fitted.degrees - noise.degrees, 1.0)
+        limit = noise.degrees + rest * float(fdtri(rest, noise.degrees, 1 - FALSE_ALARM))
+    limit /= fitted.degrees
     yield check(
         "reconvolution",
         solution.deconvolution.misfit.chi2_reduced,
@@ -135,17 +140,6 @@ def _reconvolutions(solution: Solution) -> _Checks:
         "A failure means that G is not Gaussian at this noise, or that something is not as stated.",
         p_value,
     )
-
-
-def _misfit_limit(estimate: ProfileEstimate, degrees: float) -> float:
-    """Limit of a reduced chi-square, whose noise is stated or is known by degrees of its own."""
-    noise = estimate.raster_noise
-    if noise is None:
-        return chi_square_limit(degrees) / degrees
-    # What the noise was estimated from is a part of the misfit: the rest of it is independent.
-    rest = max(degrees - noise.degrees, 1.0)
-    largest = float(fdtri(rest, noise.degrees, 1 - FALSE_ALARM))
-    return (noise.degrees + rest * largest) / degrees
 
 
 def _constraint(solution: Solution) -> _Checks:
@@ -565,14 +559,6 @@ def _held_out(estimate: ProfileEstimate) -> _Checks:
         _, first, index = np.unique(group, return_index=True, return_inverse=True)
         if first.size > 1:
             held_out.setdefault(first[index].tobytes(), what)
-    for what in reversed(held_out.values()):
-        yield from _prediction(estimate, what, groups[what])
-
-
-def _prediction(estimate: ProfileEstimate, what: str, group: IndexArray) -> _Checks:
-    worst = model_tests.hold_out(estimate, group)
-    if worst is None:
-        return
     causes = {
         "repeat": "something changed between repeats: the load, the contact, the sensor; look at "
         "this repeat, and leave it out if its reason is known",
@@ -583,15 +569,19 @@ def _prediction(estimate: ProfileEstimate, what: str, group: IndexArray) -> _Che
     }
     stated = estimate.points.u_errors is not None
     scale = "" if stated else ", over the others' own scatter as no noise is stated"
-    joined = "" if worst.alone else f", {what}s taken several at a time"
-    yield _tested(
-        f"held_out_{what}",
-        worst,
-        f"Chi-square per degree of one {what}'s voltages against their prediction from the others, "
-        f"with the uncertainty of both{scale}; the worst of {worst.folds}, number {worst.worst + 1}"
-        f"{joined}. Its own baseline, drift and centre are fitted to it. A failure means that "
-        f"{causes[what]}.",
-    )
+    for what in reversed(held_out.values()):
+        worst = model_tests.hold_out(estimate, groups[what])
+        if worst is None:
+            continue
+        joined = "" if worst.alone else f", {what}s taken several at a time"
+        yield _tested(
+            f"held_out_{what}",
+            worst,
+            f"Chi-square per degree of one {what}'s voltages against their prediction from the "
+            f"others, with the uncertainty of both{scale}; the worst of {worst.folds}, number "
+            f"{worst.worst + 1}{joined}. Its own baseline, drift and centre are fitted to it. A "
+            f"failure means that {causes[what]}.",
+        )
 
 
 def _saturation(estimate: ProfileEstimate) -> _Checks:

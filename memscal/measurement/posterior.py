@@ -492,7 +492,7 @@ def _alike(film: ElasticFilm, other: ElasticFilm) -> bool:
 
 @lru_cache(maxsize=16)
 def _sensor_changes(
-    apparatus: ApparatusFunction, nodes: bytes, without: tuple[str, ...] = ()
+    apparatus: ApparatusFunction, nodes: bytes, without: tuple[str, ...]
 ) -> ArrayPair:
     """Return transfer function and changes, which all profiles of one sensor share."""
     profile = apparatus.radial_profile

@@ -276,7 +276,7 @@ class HankelFilm:
         k, weights = _wavenumbers(film, 2 * r[-1])
         normal, radial = (hat_transform(r.tobytes(), k.tobytes(), order) for order in (0, 1))
         half_space = (direct[0], *across, direct[1])
-        matrices = _displacements(film, r, (k, weights), (normal, radial), half_space)
+        matrices = _displacements(film, r, k, weights, normal, radial, half_space)
         return SurfaceCompliance(r, *matrices)
 
     discretisation = "Hankel transforms, Gauss-Legendre in k"
@@ -306,9 +306,10 @@ class HankelField:
         x = np.ravel(r)
         traction = self.traction
         k, weights = _wavenumbers(self.film, x.max(initial=0.0) + traction.radius)
-        transforms = traction.pressure_transform(k), traction.shear_transform(k)
+        p = traction.pressure_transform(k)
+        q = traction.shear_transform(k)
         half_space = traction.half_space_integrals(x)
-        displaced = _displacements(self.film, x, (k, weights), transforms, half_space)
+        displaced = _displacements(self.film, x, k, weights, p, q, half_space)
         by_pressure, by_shear = displaced[2 * order : 2 * order + 2]
         return (by_pressure + by_shear).reshape(np.shape(r))
 
@@ -323,13 +324,13 @@ def _wavenumbers(film: ElasticFilm, reach: float) -> ArrayPair:
 def _displacements(
     film: ElasticFilm,
     x: FloatArray,
-    wavenumbers: ArrayPair,
-    transforms: ArrayPair,  # of pressure and shear, at the wavenumbers
+    k: FloatArray,
+    weights: FloatArray,
+    p: FloatArray,  # transforms of pressure and shear, at the wavenumbers
+    q: FloatArray,
     half_space: HalfSpaceIntegrals,
 ) -> HalfSpaceIntegrals:
     """Return the depression at ``x`` by p and by q, and the outward displacement by p and by q."""
-    (k, weights) = wavenumbers
-    (p, q) = transforms
     nu = film.poisson_ratio
     scale = (1 - nu) / film.shear_modulus
     beta = half_space_coupling(nu)
