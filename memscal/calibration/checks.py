@@ -202,11 +202,11 @@ def _shape(solution: Solution, parameters: ParameterSet) -> _Checks:
     ratios = [parameters["fwhm"] / (_HALF_WIDTH * parameters[name]) for name in _WIDTHS]
     widest = max(max(ratio, 1 / ratio) for ratio in ratios)
     share = ring_areas(g.r) * g.radial
-    negative = float(np.maximum(-share, 0.0).sum() / np.abs(share).sum())
+    negative = np.maximum(-share, 0.0).sum() / np.abs(share).sum()
     k, transfer = solution.fields.grid.axis_transfer(deconvolution.quotient.values)
     power = k * np.abs(transfer / deconvolution.conversion_constant) ** 2
     end = max(solution.band.resolved, solution.band.relevant, 2 / solution.estimate.gaussian.sigma)
-    rough = float(power[k > _BEYOND * end].sum() / power.sum())
+    rough = power[k > _BEYOND * end].sum() / power.sum()
     cure = "take method white-noise or bayesian, or more regularisation"
     # 2.5 by simulation, docs/checks.md: beyond sound results, in which G may be a disc or a ring.
     yield check(
@@ -244,7 +244,7 @@ def _field_shape(solution: Solution, results: Results) -> _Checks:
     if results.field_errors is not None:
         # Farther out G is tapered to zero.
         inside = solution.deconvolution.g.grid.radius < fields.support / 2
-        lobe = float(np.max((-g - _SURE * results.field_errors[1])[inside]) / g.max())
+        lobe = np.max((-g - _SURE * results.field_errors[1])[inside]) / g.max()
         meaning = (
             f"Depth of the deepest lobe of G over the plane beyond {_SURE:g} standard "
             "uncertainties, over the largest G. A failure means that G has ripples that its "
