@@ -453,7 +453,9 @@ def _parameters(
     conversion = _fitted(kernel, gain[:1])
     parts = [kernel[:1], _fitted(kernel, gain[shape]), widths, nuisance, conversion]
     values = [
-        *(deconvolution.conversion_constant, fit.sigma, *fit.ellipticity[:ellipse]),
+        deconvolution.conversion_constant,
+        fit.sigma,
+        *fit.ellipticity[:ellipse],
         *(functional.value for functional in functionals),
         *scale * np.append(estimate.centres[estimate.points.free], estimate.drifts),
         fit.conversion_constant,

@@ -24,7 +24,7 @@ from memscal.estimation.gaussian import fit_gaussian_to_points
 from memscal.estimation.points import TANGENTIAL, ScanPoints, measured_mask, measured_points
 from memscal.estimation.profile import NUMERICAL_FLOOR, ProfileEstimate, stated_weights
 from memscal.estimation.voltage_map import square_root
-from memscal.measurement.posterior import film_transfer, sensor_changes, shared_changes
+from memscal.measurement.posterior import columns_of, film_transfer, sensor_changes, shared_changes
 from memscal.measurement.restoration import Restoration
 from memscal.measurement.restore import gaussian_pressure, load_of, undetermined, unit_force
 from memscal.mechanics.contact import Contact
@@ -467,11 +467,9 @@ def _on_axis(restored: Restoration) -> tuple[float, Mapping[str, float]]:
     changes = {source: row @ columns[:nodes] for source, columns in posterior.changes.items()}
     k_and_zero = np.append(k, 0.0)
     shared = shared_changes(apparatus, [restored.scan], k_and_zero)
-    none = np.zeros_like(k_and_zero)
-    film = [shared.get(name, none) for name in posterior.film_inputs]
     kernel_changes = {
         "apparatus": sensor_changes(apparatus, k_and_zero, shared)[1],
-        "film": np.reshape(film, (-1, none.size)).T,
+        "film": columns_of(shared, posterior.film_inputs, k_and_zero.size),
     }
     if "load" in shared:
         kernel_changes["load"] = shared["load"][:, None]

@@ -361,13 +361,9 @@ def posterior_of(
     film_changes = _film_changes(set_up, wavenumbers)
     shared = shared_changes(apparatus, [scan], model.k)
     # One error of a film that sensor and contact share changes A G and the film's transfer.
-    names = tuple(dict.fromkeys([*film_changes, *shared]))
-    names = tuple(name for name in names if name != "load")
-    nothing = np.zeros(nodes)
-    by_film = [film_changes.get(name, nothing) for name in names]
-    by_sensor = [shared.get(name, nothing) for name in names]
-    of_film = np.reshape(by_film, (-1, nodes)).T
-    of_kernel = np.reshape(by_sensor, (-1, nodes)).T
+    names = tuple(name for name in film_changes | shared if name != "load")
+    of_film = columns_of(film_changes, names, nodes)
+    of_kernel = columns_of(shared, names, nodes)
     together = of_film * transfer[:, None] + of_kernel * film[:, None]
     _, sensor = sensor_changes(apparatus, model.k, shared)
     slope = model.radial_derivative(estimate.gaussian.geometry, mean[:nodes])
@@ -406,6 +402,12 @@ def posterior_of(
         noise_ratio=estimate.adopted_noise(averaged.noise) / estimate.noise_scale,
         resolved_wavenumber=float(min(resolved, np.pi / estimate.points.step)),
     )
+
+
+def columns_of(changes: Arrays, names: Sequence[str], count: int) -> FloatArray:
+    """Return changes by some inputs as columns, (count, q); of one that changes nothing, zeros."""
+    rows = [changes.get(name, np.zeros(count)) for name in names]
+    return np.reshape(rows, (-1, count)).T
 
 
 def _signals(estimate: ProfileEstimate, state: FloatArray, changes: FloatArray) -> FloatArray:

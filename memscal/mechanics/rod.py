@@ -131,9 +131,7 @@ class RodTraction:
         # transforms of cosine and sine (Gradshteyn and Ryzhik 6.671); exact by Gauss quadrature.
         even = _series(self.pressure_terms, 0)
         odd = _series(self.shear_terms, 1)
-        nodes, weights = np.polynomial.legendre.leggauss(max(even.size, odd.size) + 24)
-        share = (nodes + 1) / 2
-        weights = weights / 2
+        share, weights = gauss_panels(1.0, 1.0, max(even.size, odd.size) + 24)
 
         # t = c sin(theta) below c = min(rho, 1): the root sqrt(rho^2 - t^2) cancels against dt.
         inner = np.minimum(rho, 1.0)

@@ -25,6 +25,7 @@ from typing import Protocol
 import numpy as np
 from scipy.special import ellipe, ellipkm1
 
+from memscal.axisymmetry.hankel import gauss_panels
 from memscal.model.arrays import ArrayPair, BoolArray, FloatArray, IndexArray, array_record
 
 
@@ -98,10 +99,9 @@ def singular_integrals(x: FloatArray, rings: FloatArray) -> ArrayPair:
     starts = rings[:-1]
     ends = rings[1:]
     lengths = ends - starts
-    nodes, weights = np.polynomial.legendre.leggauss(_ORDER)
-    share = (nodes + 1) / 2
+    share, weights = gauss_panels(1.0, 1.0, _ORDER)
     s = starts[:, None] + lengths[:, None] * share
-    measure = s * lengths[:, None] * weights / 2
+    measure = s * lengths[:, None] * weights
     kernels = _kernels(x[:, None, None], s[None], np.abs(x[:, None, None] - s))
     rising = measure * share
     falling = measure * (1 - share)
@@ -163,10 +163,9 @@ def _near_integrals(
     at = x[point]
     cut = np.clip(at, start, end)
     # Nodes on (0, 1) that crowd towards 0.
-    nodes, weights = np.polynomial.legendre.leggauss(_NEAR_ORDER)
-    u = (nodes + 1) / 2
+    u, weights = gauss_panels(1.0, 1.0, _NEAR_ORDER)
     v = u**_CROWDING
-    weights = weights / 2 * _CROWDING * u ** (_CROWDING - 1)
+    weights = weights * _CROWDING * u ** (_CROWDING - 1)
     totals = [(np.zeros(point.size), np.zeros(point.size)) for _ in range(2)]
     for side in (start, end):
         outside = np.flatnonzero(side != cut)
