@@ -20,7 +20,7 @@ is counted beside that, as it is for the profile (``window``).
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,7 +43,7 @@ from memscal.model.arrays import (
 )
 from memscal.progress import Task
 
-ComplexArray: TypeAlias = NDArray[np.complex128]
+ComplexArray = NDArray[np.complex128]
 
 #: Windows below this have closed: what they pass of the noise's variance is no larger.
 _CLOSED = 1e-6

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import lru_cache
-from typing import ClassVar, TypeAlias
+from typing import ClassVar
 
 import numpy as np
 import scipy.fft
@@ -268,7 +268,7 @@ def _lifted(grid: EvenGrid, k: bytes, weights: bytes, values: bytes) -> Field:
     return Field(grid, on_grid(spectrum.at, grid, grid.spacing / 2))
 
 
-Fields: TypeAlias = LineFields | RasterFields
+Fields = LineFields | RasterFields
 """Voltage and stress on one grid, with the ways back from the grid."""
 
 

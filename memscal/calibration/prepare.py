@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import chain
 from os import PathLike
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -35,12 +35,10 @@ from memscal.readings.crossed_lines import crossed_lines
 if TYPE_CHECKING:
     from memscal.calibration.film_inference import FreeThickness
 
-Reference: TypeAlias = (
-    StressProfile | StressField | IdealReference | Contact | str | PathLike[str] | None
-)
+Reference = StressProfile | StressField | IdealReference | Contact | str | PathLike[str] | None
 """A base stress, an ideal reference, the path or name of one, or nothing: the rod is solved."""
 
-References: TypeAlias = Reference | Sequence[Reference]
+References = Reference | Sequence[Reference]
 """One of all scans, or one of each."""
 
 

@@ -14,7 +14,7 @@ import math
 from collections.abc import Collection, Mapping
 from functools import cached_property
 from numbers import Integral, Real
-from typing import TYPE_CHECKING, Any, ClassVar, Protocol, TypeAlias
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
 import numpy as np
 import scipy.fft
@@ -99,7 +99,7 @@ class Regulariser(Protocol):
         """Divide the voltage field by the stress field."""
 
 
-Method: TypeAlias = Regulariser | Bayesian
+Method = Regulariser | Bayesian
 """A way from a scan to A and G: by a division, or by Bayesian model averaging."""
 
 

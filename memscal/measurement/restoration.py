@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from os import PathLike
-from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -33,7 +32,7 @@ from memscal.model.stress import StressProfile
 #: Loads of a curved indenter may differ by this share: its stress is not proportional to them.
 SAME_LOAD = 0.01
 
-Expected: TypeAlias = BaseStress | str | PathLike[str] | None
+Expected = BaseStress | str | PathLike[str] | None
 """A base stress to compare with, or the path of a file that holds one."""
 
 #: Coverage factor of 95 %.
