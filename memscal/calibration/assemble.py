@@ -56,6 +56,7 @@ def assemble(
     quotient = solution.deconvolution.quotient
     k, transfer = solution.fields.grid.axis_transfer(quotient.values)
     modulus = np.abs(transfer) / solution.deconvolution.conversion_constant
+    messages = calibration_messages(prepared, solution, results, checks, laws, assumptions)
     return ApparatusFunction(
         plane=_plane(solution, results),
         radial_profile=_radial(solution, solution.deconvolution, results),
@@ -72,7 +73,7 @@ def assemble(
         reference=reference,
         process=Process.of_now(
             configuration=_configuration(prepared, solution, results, laws, explanations),
-            messages=calibration_messages(prepared, solution, results, checks, laws, assumptions),
+            messages=tuple(messages),
             input_scan=scan.source,
             input_reference=reference.source,
         ),

@@ -1,6 +1,6 @@
 """Messages of a calibration: what a user has to know of its result beside the checks."""
 
-from collections.abc import Container, Sequence
+from collections.abc import Container, Iterator, Sequence
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from memscal.estimation.reference_spectra import RECTANGLE
 from memscal.mechanics.contact import Contact
 from memscal.model import checks as quality
 from memscal.model.assumptions import ASSUMED, MOVED, Assumption
-from memscal.model.checks import Message, Messages, QualityChecks
+from memscal.model.checks import Message, QualityChecks
 from memscal.model.film import LINEAR, NEO_HOOKEAN, law_in_words
 
 #: Methods whose window is that of the stress's transform: nothing is left to say of them.
@@ -37,27 +37,27 @@ def calibration_messages(
     checks: QualityChecks,
     laws: FilmLawComparison | None,
     assumptions: tuple[Assumption, ...],
-) -> Messages:
-    """Return the messages that accompany a result: what was decided, then warnings first."""
+) -> Iterator[Message]:
+    """Yield the messages that accompany a result: what was decided, then warnings first."""
     estimate = solution.estimate
     channel = estimate.points.channel
     stress = solution.stress
-    messages = quality.override_messages(prepared.overridden)
+    yield from quality.override_messages(prepared.overridden)
     if laws is not None:
-        messages.append(laws.message)
+        yield laws.message
     if prepared.thickness is not None:
-        messages += prepared.thickness.messages
-    messages += _unstated_load(prepared, solution)
-    messages += quality.failed_check_messages(checks)
+        yield from prepared.thickness.messages
+    yield from _unstated_load(prepared, solution)
+    yield from quality.failed_check_messages(checks)
     if estimate.points.order:
         text = (
             f"Channel {channel} is experimental: it was tested on synthetic data only. A and G are "
             "those of the shear at the base; the voltage is positive where the film pulls the "
             f"sensor towards larger {channel[0]}."
         )
-        messages.append(Message("experimental", text))
+        yield Message("experimental", text)
     if solution.per_repeat:
-        messages.append(_centres(solution))
+        yield _centres(solution)
     offsets = [abs(scan.line_offset) for scan in solution.scans]
     if max(offsets) > 0:
         distances = " and ".join(f"{offset * 1e3:.3f} mm" for offset in offsets)
@@ -65,30 +65,31 @@ def calibration_messages(
             f"The lines pass the sensor's centre at {distances}, each by the centre of the line "
             "across it: their positions are taken as those of one stage."
         )
-        messages.append(Message("line_offset", text))
+        yield Message("line_offset", text)
     clipped = round(sum(scan.at_ceiling for scan in prepared.as_stated))
     if clipped:
-        messages.append(Message("at_ceiling", quality.at_ceiling_text(clipped)))
-    messages += point_messages(estimate)
+        yield Message("at_ceiling", quality.at_ceiling_text(clipped))
+    yield from point_messages(estimate)
     if estimate.points.u_errors is None:
-        messages.append(_noise(estimate, results))
-    messages += _method(solution) + _form_of_g(results)
+        yield _noise(estimate, results)
+    yield from _method(solution)
+    yield from _form_of_g(results)
     form = stress.form
     if form is not None:
         text = (
             f"The reference is a {form}, taken as exact: A is the reading over its unit, "
             f"{form.unit}. Film and rod do not enter: what they blur is in G."
         )
-        messages.append(Message("reference", f"{text} {form.notes}".strip()))
+        yield Message("reference", f"{text} {form.notes}".strip())
     elif not isinstance(stress, Contact) and stress.convergence is None:
         text = "The reference states no convergence: its own error is not counted."
-        messages.append(Message("convergence_unstated", text))
+        yield Message("convergence_unstated", text)
     if form is None:
-        messages += _law(solution, results) + _unstated(solution)
-    messages += _assumed(assumptions, results.budget["conversion_constant"])
+        yield from _law(solution, results)
+        yield from _unstated(solution)
+    yield from _assumed(assumptions, results.budget["conversion_constant"])
     if solution.scan.synthetic is not None:
-        messages.append(Message("synthetic", "The scan is synthetic: its truth is stored in it."))
-    return tuple(messages)
+        yield Message("synthetic", "The scan is synthetic: its truth is stored in it.")
 
 
 def _unstated_load(prepared: Prepared, solution: Solution) -> list[Message]:
