@@ -39,7 +39,6 @@ Expected = BaseStress | str | PathLike[str] | None
 _EXPANDED = 1.96
 #: Differences below this share of the largest stress are negligible.
 _NEGLIGIBLE = 1e-3
-_OF_RESTORED = "Measured, not calculated: restored with an apparatus function."
 
 
 @array_record
@@ -260,7 +259,9 @@ class Restoration(Result, Checked):
             film=self.scan.film,
             indenter=self.scan.indenter,
             solver="memscal, restored from a scan",
-            notes=" ".join([_OF_RESTORED, *overridden]),
+            notes=" ".join(
+                ["Measured, not calculated: restored with an apparatus function.", *overridden]
+            ),
         )
 
     @property

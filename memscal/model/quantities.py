@@ -197,54 +197,58 @@ _L = "length"
 _U = "voltage"
 _ONE = "dimensionless"
 
-_ESTIMATED = (
-    Quantity("conversion_constant", _A, "conversion constant", "A"),
-    Quantity("gaussian_sigma", _L, "Gaussian width, fitted to the scan", "σ"),
-    Quantity(
-        "gaussian_sigma_deconvolved", _L, "Gaussian width, fitted to the deconvolved G", "σ(G)"
-    ),
-    Quantity("fwhm", _L, "full width of G at half maximum", "FWHM"),
-    Quantity("noise_equivalent_area", "area", "noise-equivalent area of G"),
-    Quantity("ellipticity", _ONE, "ellipticity of the Gaussian along x", "e₁"),
-    Quantity("ellipticity_diagonal", _ONE, "ellipticity of the Gaussian along the diagonal", "e₂"),
-    Quantity("centre", _L, "centre of the scan", "x₀"),
-    Quantity("centre_y", _L, "centre of the scan along y", "y₀"),
-    Quantity("baseline", _U, "baseline", "U₀"),
-    Quantity("baseline_curvature", _U, "curvature of the baseline, edge to centre"),
-    Quantity("baseline_slope", "voltage per length", "baseline slope"),
-    Quantity("drift", _U, "drift of the baseline across the scan", "ΔU"),
-    Quantity("drift_y", _U, "drift of the baseline along y", "ΔU"),
-    Quantity("conversion_constant_gaussian", _A, "conversion constant with the Gaussian", "A"),
-    Quantity("force", "force", "force", "P"),
-    Quantity("maximum", "stress", "largest stress", "S"),
+ESTIMATED = by_name(
+    (
+        Quantity("conversion_constant", _A, "conversion constant", "A"),
+        Quantity("gaussian_sigma", _L, "Gaussian width, fitted to the scan", "σ"),
+        Quantity(
+            "gaussian_sigma_deconvolved", _L, "Gaussian width, fitted to the deconvolved G", "σ(G)"
+        ),
+        Quantity("fwhm", _L, "full width of G at half maximum", "FWHM"),
+        Quantity("noise_equivalent_area", "area", "noise-equivalent area of G"),
+        Quantity("ellipticity", _ONE, "ellipticity of the Gaussian along x", "e₁"),
+        Quantity(
+            "ellipticity_diagonal", _ONE, "ellipticity of the Gaussian along the diagonal", "e₂"
+        ),
+        Quantity("centre", _L, "centre of the scan", "x₀"),
+        Quantity("centre_y", _L, "centre of the scan along y", "y₀"),
+        Quantity("baseline", _U, "baseline", "U₀"),
+        Quantity("baseline_curvature", _U, "curvature of the baseline, edge to centre"),
+        Quantity("baseline_slope", "voltage per length", "baseline slope"),
+        Quantity("drift", _U, "drift of the baseline across the scan", "ΔU"),
+        Quantity("drift_y", _U, "drift of the baseline along y", "ΔU"),
+        Quantity("conversion_constant_gaussian", _A, "conversion constant with the Gaussian", "A"),
+        Quantity("force", "force", "force", "P"),
+        Quantity("maximum", "stress", "largest stress", "S"),
+    )
 )
-ESTIMATED = by_name(_ESTIMATED)
 """What a calibration or a measurement estimates: parameters of an artifact, rows of a budget."""
 
-_TRUTH = (
-    Quantity("gaussian_sigma", _L, "Gaussian width", "σ"),
-    Quantity("noise", _U, "noise"),
-    Quantity("young_modulus", "stress", "Young's modulus of the film", "E", shown="MPa"),
-    Quantity("poisson_ratio", _ONE, "Poisson's ratio of the film", "ν"),
-    Quantity("thickness", _L, "thickness of the film", "h"),
-    Quantity("indenter_radius", _L, "radius of the indenter", "R"),
-    Quantity("load", "force", "true load", "P"),
-    Quantity("friction", _ONE, "friction coefficient", "μ"),
-    Quantity("rod_friction", _ONE, "friction of the rod"),
-    Quantity("mooney_rivlin_ratio", _ONE, "C2/C1 of the film"),
-    Quantity("slip_length", _L, "slip length", shown="um"),
-    Quantity("roughness", _L, "rms height of the asperities", shown="um"),
-    Quantity("asperity_density", "per area", "asperities", shown="1/mm^2"),
-    Quantity("asperity_radius", _L, "radius of their tips", shown="um"),
-    Quantity("decay_length", _L, "decay length of the pressure", shown="um"),
-    Quantity("reference_pressure", "stress", "pressure where mean planes meet", shown="MPa"),
-    Quantity("load_scale", _ONE, "true loads over the stated"),
-    Quantity("load_scatter", _ONE, "scatter of the loads", shown="percent"),
-    Quantity("position_error", _L, "scatter of the positions", shown="um"),
-    Quantity("gain", _ONE, "gain against the rod scan"),
-    Quantity("seed", _ONE, "seed"),
+TRUTH = ESTIMATED | by_name(
+    (
+        Quantity("gaussian_sigma", _L, "Gaussian width", "σ"),
+        Quantity("noise", _U, "noise"),
+        Quantity("young_modulus", "stress", "Young's modulus of the film", "E", shown="MPa"),
+        Quantity("poisson_ratio", _ONE, "Poisson's ratio of the film", "ν"),
+        Quantity("thickness", _L, "thickness of the film", "h"),
+        Quantity("indenter_radius", _L, "radius of the indenter", "R"),
+        Quantity("load", "force", "true load", "P"),
+        Quantity("friction", _ONE, "friction coefficient", "μ"),
+        Quantity("rod_friction", _ONE, "friction of the rod"),
+        Quantity("mooney_rivlin_ratio", _ONE, "C2/C1 of the film"),
+        Quantity("slip_length", _L, "slip length", shown="um"),
+        Quantity("roughness", _L, "rms height of the asperities", shown="um"),
+        Quantity("asperity_density", "per area", "asperities", shown="1/mm^2"),
+        Quantity("asperity_radius", _L, "radius of their tips", shown="um"),
+        Quantity("decay_length", _L, "decay length of the pressure", shown="um"),
+        Quantity("reference_pressure", "stress", "pressure where mean planes meet", shown="MPa"),
+        Quantity("load_scale", _ONE, "true loads over the stated"),
+        Quantity("load_scatter", _ONE, "scatter of the loads", shown="percent"),
+        Quantity("position_error", _L, "scatter of the positions", shown="um"),
+        Quantity("gain", _ONE, "gain against the rod scan"),
+        Quantity("seed", _ONE, "seed"),
+    )
 )
-TRUTH = ESTIMATED | by_name(_TRUTH)
 """The truth of a simulated experiment: what is estimated, film and indenter, what went wrong."""
 
 

@@ -48,8 +48,11 @@ INDENTER_FACE = record(
     signal="z",
 )
 _LOAD = measured(Quantity("load", "force", "load", "P", required=True))
-_ROD_FRICTION = Quantity("rod_friction", _ONE, "friction of the rod", stored="friction_coefficient")
-LOAD = record("NXcollection", *_LOAD, _ROD_FRICTION)
+LOAD = record(
+    "NXcollection",
+    *_LOAD,
+    Quantity("rod_friction", _ONE, "friction of the rod", stored="friction_coefficient"),
+)
 INDENTER = record(
     "NXcollection",
     Quantity("shape", "text", "shape of the indenter", required=True),
@@ -92,8 +95,13 @@ USER = record(
     Quantity("name", "text", "who measured", origin="user"),
     Quantity("affiliation", "text", "laboratory", origin="laboratory"),
 )
-_CONSTANT = Quantity("conversion_constant", _A, "conversion constant", "A", required=True)
-CONVERSION = record("NXcollection", *measured(_CONSTANT, required=True))
+CONVERSION = record(
+    "NXcollection",
+    *measured(
+        Quantity("conversion_constant", _A, "conversion constant", "A", required=True),
+        required=True,
+    ),
+)
 
 TIMES = record(
     "NXentry",
@@ -303,14 +311,18 @@ def assumption_record(*, is_length: bool) -> Record:
     return record("NXcollection", state, *required(*sizes))
 
 
-_ENVIRONMENT = "Versions of Python and of the numerical libraries."
 PROCESS = record(
     "NXprocess",
     Quantity("program", "text", "program", origin="program"),
     Quantity("version", "text", "version of the program", origin="version"),
     Quantity("date", "text", "date", origin="date"),
     Quantity("configuration", "mapping", "Every option with its value.", origin="configuration"),
-    Quantity("environment", "mapping", _ENVIRONMENT, origin="environment"),
+    Quantity(
+        "environment",
+        "mapping",
+        "Versions of Python and of the numerical libraries.",
+        origin="environment",
+    ),
     Quantity("messages", "messages", "What the user was told while it ran.", origin="messages"),
     Quantity("input_scan", "file", "scan", origin="input_scan"),
     Quantity("input_reference", "file", "reference", origin="input_reference"),
@@ -354,16 +366,26 @@ STRESS_CURVE = record(
     ),
     signal="s_zz",
 )
-_OF_SCALE = "relative uncertainty of all positions"
-_OF_GAIN = "relative uncertainty of all readings"
 MEASURED_SCAN = record(
     "NXcollection",
     *required(
         Quantity("width", _L, "extent of the positions"),
         Quantity("synthetic", "truth", "whether the scan is synthetic"),
     ),
-    Quantity("position_scale_uncertainty", _ONE, _OF_SCALE, stored="position_scale_errors", of=1.0),
-    Quantity("gain_uncertainty", _ONE, _OF_GAIN, stored="gain_errors", of=1.0),
+    Quantity(
+        "position_scale_uncertainty",
+        _ONE,
+        "relative uncertainty of all positions",
+        stored="position_scale_errors",
+        of=1.0,
+    ),
+    Quantity(
+        "gain_uncertainty",
+        _ONE,
+        "relative uncertainty of all readings",
+        stored="gain_errors",
+        of=1.0,
+    ),
     Quantity("position_errors_by_repeat", "truth", "whether x_errors are new in each repeat"),
     Quantity("unit", "text", "unit of readings that are no voltages"),
 )
