@@ -168,13 +168,15 @@ def _agreement(solution: Solution, results: Results, division: DivisionMap | Non
     """Compare the results of both routes, and the width of G with the one fitted to the scan."""
     difference = route_difference(solution, division)
     if difference is not None:
-        meaning = (
+        yield check(
+            "method_agreement",
+            difference,
+            _ROUTES_LIMIT,
             "Difference of the division of the fields from the Bayesian estimate, in A or in G(r), "
             "beyond what the window hides, over what noise explains. A failure means that the "
             "scan shows a feature that the one follows and the other does not, or that the method "
-            "failed: look at the residuals and at both G(r)."
+            "failed: look at the residuals and at both G(r).",
         )
-        yield check("method_agreement", difference, _ROUTES_LIMIT, meaning)
     route = "by division of the fields" if solution.deconvolution.divided else "in data space"
     parameters = results.parameters
     i, j = (parameters.names.index(name) for name in _WIDTHS)
@@ -245,12 +247,14 @@ def _field_shape(solution: Solution, results: Results) -> _Checks:
         # Farther out G is tapered to zero.
         inside = solution.deconvolution.g.grid.radius < fields.support / 2
         lobe = np.max((-g - _SURE * results.field_errors[1])[inside]) / g.max()
-        meaning = (
+        yield check(
+            "field_lobes",
+            max(lobe, 0.0),
+            _LOBE,
             f"Depth of the deepest lobe of G over the plane beyond {_SURE:g} standard "
             "uncertainties, over the largest G. A failure means that G has ripples that its "
-            "uncertainty does not count: look at the field of G, and take method bayesian."
+            "uncertainty does not count: look at the field of G, and take method bayesian.",
         )
-        yield check("field_lobes", max(lobe, 0.0), _LOBE, meaning)
     weight = estimate.outlier_weight
     left = weight * (estimate.points.u - estimate.predicted)
     noise = solution.band.excess * weight**0.5 * estimate.noise
@@ -273,11 +277,13 @@ def _set_up(solution: Solution) -> _Checks:
     sigma = estimate.gaussian.sigma
     source = solution.stress.form is not None
     if film is not None and not source:
-        meaning = (
+        yield check(
+            "width_over_thickness",
+            sigma / film.thickness,
+            3.0,
             "Width of G over the film's thickness. A failure means that the unit of the positions "
-            "or of the film's thickness should be looked at."
+            "or of the film's thickness should be looked at.",
         )
-        yield check("width_over_thickness", sigma / film.thickness, 3.0, meaning)
     resolved = solution.band.resolved
     yield check(
         "resolved_band",
@@ -299,13 +305,15 @@ def _set_up(solution: Solution) -> _Checks:
     )
     yield from _baseline(estimate)
     if not source:
-        meaning = (
+        force = carried_force(solution.stress, estimate.model.reference)
+        yield check(
+            "reference_force",
+            abs(force - 1.0),
+            0.01,
             "Relative difference of the reference's total force from the load. A failure means "
             "that the reference was made for another load, or that its table ends too early; A is "
-            "wrong by as much."
+            "wrong by as much.",
         )
-        force = carried_force(solution.stress, estimate.model.reference)
-        yield check("reference_force", abs(force - 1.0), 0.01, meaning)
     yield outlier_check(estimate.outlier_weight, "the points that the messages name")
 
 
@@ -322,17 +330,19 @@ def _baseline(estimate: ProfileEstimate) -> _Checks:
     )
     count = points.curved.size
     if count:
-        meaning = (
-            "Fitted curvature of the baseline, edge to centre, over what its prior and the noise "
-            "make of it. A failure means that the baseline bends by more than was allowed for, or "
-            "that something else looks like it: a tail of G, the amplifier. State "
-            "baseline_curvature_uncertainty, or let amplifier and film settle."
-        )
         prior = points.curvature[points.curved] ** 2
         # What a mean has of the prior's variance the posterior has not.
         found = prior - np.diag(estimate.weighed.covariance)[points.curvatures]
         share = np.abs(estimate.drifts[-count:]) / np.sqrt(np.maximum(found, _LEAST_FOUND * prior))
-        yield check("baseline_curvature", share.max(), _CURVED, meaning)
+        yield check(
+            "baseline_curvature",
+            share.max(),
+            _CURVED,
+            "Fitted curvature of the baseline, edge to centre, over what its prior and the noise "
+            "make of it. A failure means that the baseline bends by more than was allowed for, or "
+            "that something else looks like it: a tail of G, the amplifier. State "
+            "baseline_curvature_uncertainty, or let amplifier and film settle.",
+        )
 
 
 def _indentation(solution: Solution, results: Results, assumed: Sequence[Assumption]) -> _Checks:
@@ -436,13 +446,15 @@ def _bayes_factor(estimate: ProfileEstimate) -> QualityCheck:
 def _symmetry(estimate: ProfileEstimate) -> QualityCheck:
     if estimate.points.planar:
         uneven = model_tests.axisymmetry_test(estimate)
-        meaning = (
+        return check(
+            "axisymmetry",
+            uneven.fall,
+            math.inf,
             f"Fall of chi-square by {uneven.count} columns of an elliptic sensor, which then make "
             f"up {uneven.size:.2%} of the largest signal. It has no limit, for G over the plane "
             "need not be round; beyond 18 the radial profile is only a mean over directions. A "
-            "failure means that the ellipse could not be fitted."
+            "failure means that the ellipse could not be fitted.",
         )
-        return check("axisymmetry", uneven.fall, math.inf, meaning)
     extra = model_tests.symmetry_test(estimate)
     parity = "odd"
     failure = ": a tilted rod, an uneven film, a drifting load, or a lag along the scan"
@@ -465,23 +477,26 @@ def _steadiness(solution: Solution) -> _Checks:
     estimate = solution.estimate
     linear = model_tests.linearity_test(estimate)
     if linear is not None:
-        meaning = (
+        yield added_check(
+            "load_linearity",
+            linear.fall,
+            linear.count,
             "Fall of chi-square by a conversion constant that changes with the load, here by "
             f"{float(linear.coefficients[0]):.2%} per mean load. A failure means that the output "
-            "is not linear in the load, and that one A does not serve all loads."
+            "is not linear in the load, and that one A does not serve all loads.",
         )
-        yield added_check("load_linearity", linear.fall, linear.count, meaning)
     yield from _hysteresis(estimate)
     yield from _runs(estimate)
     apart = solution.apart
     if apart is not None and not solution.per_repeat:
-        meaning = (
+        yield _tested(
+            "repeat_centres",
+            apart,
             "Fall of the squared residuals by a centre for each repeat, over the scatter that is "
             f"left: an F ratio. The centres are up to {apart.distance * 1e6:.3g} um apart. A "
             "failure means that stage or sensor moved from repeat to repeat, and that the one "
-            "centre widens G: take a centre per repeat (--centre per-repeat)."
+            "centre widens G: take a centre per repeat (--centre per-repeat).",
         )
-        yield _tested("repeat_centres", apart, meaning)
 
 
 def _hysteresis(estimate: ProfileEstimate) -> _Checks:
