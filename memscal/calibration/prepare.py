@@ -104,16 +104,7 @@ def prepare(as_stated: Sequence[Scan], request: Request) -> Prepared:
         require_calibration_rod(scan, given)
         scan = _with_law(scan, given, request)
         stated.append(given or scan.reference)
-        if request.relative:
-            # A rod that has to be solved keeps its nominal load.
-            scan = replace(
-                scan,
-                load=None if stated[-1] else scan.load,
-                load_uncertainty=None,
-                normal_load=None,
-                normal_load_errors=None,
-            )
-        scans.append(scan)
+        scans.append(_without_loads(scan, stated[-1]) if request.relative else scan)
     alternatives = None
     if request.alternative is not None:
         alternatives = _references(request.alternative, scans, replace(request, pixel_size=None))
@@ -188,6 +179,17 @@ def _with_some_load(scan: Scan) -> Scan:
     per_newton = press_rod(*light).depth / _LIGHT
     deepest = min(0.4 * light.film.thickness, 3 * light.indenter.radius)
     return replace(scan, load=min(1.0, deepest / per_newton))
+
+
+def _without_loads(scan: Scan, stress: BaseStress | None) -> Scan:
+    """Return the scan without loads; a rod that has to be solved keeps its nominal one."""
+    return replace(
+        scan,
+        load=None if stress else scan.load,
+        load_uncertainty=None,
+        normal_load=None,
+        normal_load_errors=None,
+    )
 
 
 def _references(

@@ -87,12 +87,14 @@ def base_response(x: ArrayLike, nu: float, order: int = 0) -> ArrayPair:
     """
     x, decay, denominator, _ = _prepare(x, nu)
     scale = 4 * (1 - nu) * np.exp(-x)
+    rising = 2 * (1 - nu) * (1 + decay)
+    falling = np.expm1(-2 * x)
     if order:
         by_pressure = (1 - 2 * nu) * _x_cosh_minus_sinh(x, decay) + 2 * nu * x * (1 + decay)
-        by_shear = 2 * (1 - nu) * (1 + decay) + x * np.expm1(-2 * x)
+        by_shear = rising + x * falling
     else:
-        by_pressure = 2 * (1 - nu) * (1 + decay) - x * np.expm1(-2 * x)
-        by_shear = x * (1 + decay) - (1 - 2 * nu) * np.expm1(-2 * x)
+        by_pressure = rising - x * falling
+        by_shear = x * (1 + decay) - (1 - 2 * nu) * falling
     return scale * by_pressure / denominator, scale * by_shear / denominator
 
 
