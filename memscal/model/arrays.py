@@ -192,17 +192,6 @@ def table_spline(x: FloatArray, y: FloatArray) -> tuple[Any, bool]:
     return (PchipInterpolator if sharp else CubicSpline)(x, y), sharp
 
 
-def whole_numbers(name: str, values: ArrayLike) -> NDArray[np.int64]:
-    """Return a read-only copy of a vector of whole numbers."""
-    array = frozen_array(values)
-    if array.ndim != 1 or not np.isfinite(array).all() or np.any(array != np.rint(array)):
-        raise InputError(
-            f"{name} has shape {array.shape}, or holds values that are no whole numbers.",
-            cure="Give one whole number for each point.",
-        )
-    return frozen_array(array, dtype=np.int64)
-
-
 class ByContent:
     """A record with arrays that is equal to another of its class with the same content."""
 

@@ -25,7 +25,6 @@ from memscal.model.arrays import (
     require_size,
     unmasked,
     warn_of_units,
-    whole_numbers,
 )
 from memscal.model.correlation import checked_correlation, of_points
 from memscal.model.film import ElasticFilm
@@ -430,8 +429,15 @@ class Scan:
                 require_size(f"{name} of the scan (/entry/data/{name})", values, "m", smallest=0.0)
                 object.__setattr__(self, name, values)
         if self.repeat is not None:
-            repeat = whole_numbers("repeat of the scan", self.repeat)
-            object.__setattr__(self, "repeat", repeat)
+            repeat = frozen_array(self.repeat)
+            whole = np.isfinite(repeat) & (repeat == np.rint(repeat))
+            if repeat.ndim != 1 or not whole.all():
+                raise InputError(
+                    f"repeat of the scan has shape {repeat.shape}, or holds values that are no "
+                    "whole numbers.",
+                    cure="Give one whole number for each point.",
+                )
+            object.__setattr__(self, "repeat", frozen_array(repeat, dtype=np.int64))
         if self.x_errors is not None:
             errors = finite_vector("x_errors of the scan", self.x_errors)
             if errors.shape != self.x.shape or np.any(errors < 0):
