@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import lru_cache
-from typing import ClassVar
 
 import numpy as np
 import scipy.fft
@@ -85,7 +84,7 @@ class LineFields:
     inside: EvenGrid  # of the support
     confinement: FloatArray  # taper on the grid that confines a kernel to the support
     radius: FloatArray
-    even: ClassVar[bool] = True  # so that they can be divided
+    even = True  # so that they can be divided
 
     @classmethod
     def lift(

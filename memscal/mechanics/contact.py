@@ -4,7 +4,6 @@ import math
 from collections.abc import Callable
 from dataclasses import field, replace
 from functools import cached_property
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -99,8 +98,8 @@ class Contact(Result):
     interface: Interface = field(default_factory=Interface)
     strain: str = "linear"
 
-    unit: ClassVar[str] = "Pa"
-    form: ClassVar[None] = None
+    unit = "Pa"
+    form = None
 
     def __repr__(self) -> str:
         """Return what was pressed, load, depth and radius in place of the field."""

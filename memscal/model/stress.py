@@ -2,7 +2,6 @@
 
 import math
 from functools import cached_property
-from typing import ClassVar
 
 import numpy as np
 from scipy.special import j0, j1
@@ -66,7 +65,7 @@ class IdealReference:
 
     shape: str
     size: float = 0.0
-    notes: ClassVar[str] = ""
+    notes = ""
 
     def __post_init__(self) -> None:
         if self.shape not in IDEAL:
