@@ -263,8 +263,9 @@ def calibrate(
     laws = None if relative or solution.stress.form else weigh_laws(solution)
     if not other:
         by_other_route = None
-    found = (checks, laws, assumptions, explanations)
-    apparatus = assemble(prepared, solution, results, by_other_route, *found)
+    apparatus = assemble(
+        prepared, solution, results, by_other_route, checks, laws, assumptions, explanations
+    )
     return Calibration(apparatus, solution, effects, dict(request.correlations))
 
 

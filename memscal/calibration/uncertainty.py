@@ -256,10 +256,11 @@ class _Derivatives:
     @classmethod
     def stacked(cls, parts: Sequence[_Derivatives]) -> _Derivatives:
         """Put the derivatives of several results below each other."""
-        by_voltage = VoltageMap.stacked([part.by_voltage for part in parts])
-        by_state = np.vstack([part.by_state for part in parts])
-        hidden = np.vstack([part.hidden for part in parts])
-        return cls(by_voltage, by_state, hidden)
+        return cls(
+            VoltageMap.stacked([part.by_voltage for part in parts]),
+            np.vstack([part.by_state for part in parts]),
+            np.vstack([part.hidden for part in parts]),
+        )
 
 
 def propagate(
@@ -551,8 +552,7 @@ def _posterior_kernel(
     share = (place - below)[:, None]
     transfer = (1 - share) * normalised[below] + share * normalised[below + 1]
     rows = np.vstack([basis.integrals, radial, transfer])
-    nothing = np.zeros((len(rows), 0))
-    return _Derivatives(rows @ estimate.weighed.gain, rows, nothing)
+    return _Derivatives(rows @ estimate.weighed.gain, rows, np.zeros((len(rows), 0)))
 
 
 @array_record
