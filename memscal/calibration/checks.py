@@ -55,6 +55,7 @@ _KINDS = {
     **dict.fromkeys(("edge", "rough edge", "disc"), _EDGE),
     **dict.fromkeys(("core", "ring"), "a core of its own: a ring or a spike in the middle"),
     **dict.fromkeys(("tail", "wide tail"), "tails that fall more slowly than a Gaussian's"),
+    "plane": "a shape that is free in the plane",
 }
 
 
@@ -154,7 +155,8 @@ def _constraint(solution: Solution) -> _Checks:
     free = points.standardised(points.u - estimate.predicted, weights)
     rise = np.sum(kept**2) - np.sum(free**2)
     # As many combinations of departures as the scan determines, and as a constraint may remove.
-    determined = free_model(estimate).design.shape[1] - estimate.basis.flat
+    determined = free_model(estimate).design.shape[1]
+    determined -= estimate.gaussian.jacobian.shape[1]
     yield check(
         "constraint",
         max(rise, 0.0),
@@ -430,6 +432,9 @@ def _bayes_factor(estimate: ProfileEstimate) -> QualityCheck:
     for hypothesis, departure in zip(HYPOTHESES[1:], weighed.probability[1:], strict=True):
         if hypothesis.estimate > 0:
             kinds[hypothesis.kind] = kinds.get(hypothesis.kind, 0.0) + float(departure)
+    if estimate.free:
+        departed = weighed.free
+        kinds = {"plane": 1.0}
     kind = max(kinds, key=lambda name: kinds[name])
     share = kinds[kind] / max(sum(kinds.values()), 1e-300)
     return check(

@@ -86,8 +86,12 @@ def field_errors(
     variances = variances_of(solution, deconvolution, (x, y), at_nodes.ravel(), inputs)
     variances[0] *= solution.band.excess**2
     errors = np.sqrt(np.maximum(np.cumsum(variances, axis=0), 0.0))
-    planes = [RectBivariateSpline(y, x, e.reshape(y.size, x.size))(g.y, g.x) for e in errors]
-    return np.maximum.accumulate(np.maximum(planes, 0.0))
+    curved, straight = (
+        [RectBivariateSpline(y, x, e.reshape(y.size, x.size), kx=k, ky=k)(g.y, g.x) for e in errors]
+        for k in (3, 1)
+    )
+    # Where kernels end, a cubic spline falls below zero.
+    return np.maximum.accumulate(np.where(curved < np.divide(straight, 2), straight, curved))
 
 
 def _nodes(axis: FloatArray, width: float, reach: float) -> FloatArray:

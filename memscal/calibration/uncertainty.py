@@ -337,6 +337,8 @@ def _effective_degrees(
         return {}
     readings = float(estimate.outlier_weight.sum()) + estimate.points.curved.size
     degrees = max(readings - estimate.basis.flat, 1.0)
+    if estimate.raster_noise is not None:
+        degrees = max(degrees, estimate.raster_noise.degrees)
     variances = np.diag(covariance)[: len(names)]
     shares = np.sum(noise[: len(names)] ** 2, axis=1) / variances
     return dict(zip(names, (degrees / shares**2).tolist(), strict=True))

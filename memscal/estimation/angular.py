@@ -20,6 +20,8 @@ size of each order is the root mean square over its posterior, its logarithm wit
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from scipy.special import ive
 
@@ -74,7 +76,7 @@ class AngularRings:
 class AngularDepartures:
     """Kernels of unit prior variance: of each order those with a cosine, then those with a sine."""
 
-    rings: AngularRings
+    components: AngularRings
     #: (q, m) of each cosine and sine of ORDERS: amplitudes of the rings in each kernel, in V/Pa.
     amplitudes: tuple[FloatArray, ...]
 
@@ -83,16 +85,21 @@ class AngularDepartures:
         """How many kernels there are."""
         return sum(amplitudes.shape[1] for amplitudes in self.amplitudes)
 
+    def mean(self, _: Callable[..., FloatArray], place: FloatArray) -> FloatArray:
+        """Means of the kernels over directions, or their transforms, at places (n,): none."""
+        return np.zeros((place.size, self.count))
+
     def at(self, x: FloatArray, y: FloatArray, coefficients: FloatArray) -> FloatArray:
-        """Combinations (count, c) at positions from the centre, (n,) in m: (n, c), V/Pa/m^2."""
+        """Combinations (count, c) on a grid about the centre, in m: (y x, c), in V/Pa/m^2."""
         from scipy.interpolate import CubicSpline
 
-        rings = self.rings
-        total = np.zeros((x.size, coefficients.shape[1]))
+        rings = self.components
+        plane_x, plane_y = (each.ravel() for each in np.meshgrid(x, y))
+        total = np.zeros((plane_x.size, coefficients.shape[1]))
         step = rings.blur / _PER_BLUR
-        near = np.hypot(x, y) < rings.radius[-1] + _BLURS * rings.blur
-        r = np.hypot(x[near], y[near])
-        angle = np.arctan2(y[near], x[near])
+        near = np.hypot(plane_x, plane_y) < rings.radius[-1] + _BLURS * rings.blur
+        r = np.hypot(plane_x[near], plane_y[near])
+        angle = np.arctan2(plane_y[near], plane_x[near])
         table = step * np.arange(float(np.ceil(r.max(initial=0.0) / step)) + 4)
         for i, amplitudes in enumerate(self._by_rings(coefficients)):
             m = ORDERS[i // 2]
@@ -108,7 +115,7 @@ class AngularDepartures:
         parts = self._by_rings(coefficients)
         total = np.zeros((model.points.u.size, coefficients.shape[1]))
         for i, m in enumerate(ORDERS):
-            rings = self.rings.transform(m, model.k)
+            rings = self.components.transform(m, model.k)
             both = model.around(m, rings @ parts[2 * i], rings @ parts[2 * i + 1], centres)
             total += np.add(*np.hsplit(both, 2))
         return total

@@ -306,6 +306,7 @@ class WeighedFit:
     probability: FloatArray  # (h,): posterior probability of each of HYPOTHESES
     residual: FloatArray  # (n,): voltages that are not explained, in V
     log_marginals: FloatArray  # (h,): logarithm of the voltages' probability by each of HYPOTHESES
+    free: float = -np.inf  # the same by a G that is free in the plane, where that is chosen
 
 
 def weigh_departures(
@@ -336,7 +337,10 @@ def weigh_departures(
     choice = _choice(basis.flat, sizes, tuple(fitted.family for fitted in basis.families))
     given = _Conditionals.of(_Sensors.of(basis, columns, data), columns, choice, noise)
     log_marginals = np.full(len(HYPOTHESES), -np.inf)
+    # An amplitude's prior has the unit of the noise.
     log_marginals[given.number] = given.log_marginal
+    if count:
+        log_marginals += count * np.log(least_noise)
     return Weighing(reduced, basis, given, noise.added, log_marginals)
 
 
@@ -353,7 +357,17 @@ class Weighing:
     @cached_property
     def log_marginal_likelihoods(self) -> FloatArray:
         """Of all hypotheses by either prior, up to a constant of the scan, (2,)."""
-        return logsumexp(self.log_marginals, b=_PRIORS, axis=1)
+        return logsumexp(self.log_marginals, b=self.priors, axis=1)
+
+    @property
+    def evidence(self) -> float:
+        """The first of them, by the prior of the estimate."""
+        return float(self.log_marginal_likelihoods[0])
+
+    @property
+    def priors(self) -> FloatArray:
+        """Of all hypotheses, for the estimate and for its uncertainty, (2, h)."""
+        return _PRIORS if self.basis.rings else np.eye(1, len(HYPOTHESES)).repeat(2, axis=0)
 
     def average(self) -> WeighedFit:
         """Average mean and gain by one set of probabilities, squared errors by the other."""
@@ -363,7 +377,7 @@ class Weighing:
         scatter = np.zeros(len(HYPOTHESES))
         scatter[given.number] = given.scatter
         probabilities = []
-        for prior in _PRIORS:
+        for prior in self.priors:
             # Bayes' theorem; negligible probabilities are set to zero.
             held = np.where(prior > 0, self.log_marginals, -np.inf)
             weight = prior * np.exp(held - held.max())
@@ -410,11 +424,13 @@ class _Choice(NamedTuple):
 def _choice(flat: int, sizes: tuple[int, ...], families: tuple[Family, ...]) -> _Choice:
     """Return what the hypotheses choose of the flat columns, the shapes', three of each family."""
     ends = flat + np.cumsum([0, *sizes])
-    known = [(i, h) for i, h in enumerate(HYPOTHESES) if h.family in (None, *families)]
+    # Beside a G that is free in the plane the Gaussian stands alone.
+    asked = HYPOTHESES if sizes else HYPOTHESES[:1]
+    known = [(i, h) for i, h in enumerate(asked) if h.family in (None, *families)]
     family = np.zeros(len(known), dtype=np.intp)
     strength = np.ones(len(known))
     # Equal numbers of columns for all: one batch of decompositions.
-    places = np.zeros((len(known), max(sizes) + bool(families)), dtype=np.intp)
+    places = np.zeros((len(known), max(sizes, default=1) + bool(families)), dtype=np.intp)
     factors = np.zeros(places.shape)
     for row, (_, hypothesis) in enumerate(known):
         factor = hypothesis.strength

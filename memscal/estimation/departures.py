@@ -30,6 +30,7 @@ from memscal.axisymmetry.kernels import Rings
 from memscal.estimation.angular import AngularDepartures, AngularRings
 from memscal.estimation.forward import ForwardModel
 from memscal.estimation.gaussian import GaussianFit
+from memscal.estimation.plane import PlaneDepartures, Spots
 from memscal.estimation.voltage_map import SINGLE, Tall, VoltageMap, orthonormalised
 from memscal.model.arrays import FloatArray, array_record, value_record
 
@@ -166,7 +167,7 @@ class ReducedScan:
     fit: GaussianFit
     data: FloatArray  # (r,): voltages that the fit leaves over
     flat: FloatArray  # (r, p): by the parameters of the fit
-    rings: FloatArray  # (r, a): of angular rings
+    components: FloatArray  # (r, a): of what is not round: angular rings, or spots in the plane
     weights: FloatArray  # (n,)
     synthesis: FloatArray | None  # (r, nodes): of kernels by their transforms
     right: Tall | None  # (n, r): the transposed standardisation of Q
@@ -177,14 +178,14 @@ class ReducedScan:
         model: ForwardModel,
         fit: GaussianFit,
         weights: FloatArray,
-        rings: AngularRings | None = None,
+        components: AngularRings | Spots | None = None,
     ) -> ReducedScan:
-        """Reduce a scan with weights (n,), with angular rings or without."""
+        """Reduce a scan with weights (n,), with components of what is not round, or without."""
         points = model.points
         count = fit.jacobian.shape[1]
         first = [(points.u - fit.predicted)[:, None], fit.jacobian]
-        if rings:
-            first.append(rings.signal(model, fit.centre))
+        if components:
+            first.append(components.signal(model, fit.centre))
         columns, mix = model.framed(fit.geometry, first)
         columns = points.standardised(columns, weights, out=columns)
         right = None
@@ -237,7 +238,9 @@ class DepartureBasis:
     flat: int  # how many parameters have no prior: A, width, centre, baseline and drift
     rings: tuple[Rings, ...]  # the components of each of :data:`SHAPES`
     families: tuple[FamilyFit, ...]  # as many as fit the scan
-    angular: AngularDepartures | None  # the last flat ones: theirs is a prior of unit variance
+    angular: (
+        AngularDepartures | PlaneDepartures | None
+    )  # the last flat ones: theirs is a prior of unit variance
     _tables: dict[tuple[Side, bytes], FloatArray] = field(default_factory=dict, init=False)
 
     @property
@@ -257,7 +260,7 @@ class DepartureBasis:
 
     def columns(self, reduced: ReducedScan) -> FloatArray:
         """Voltages of all columns, standardised, of a reduced scan, (r, p)."""
-        around = [self.angular.combined(reduced.rings)] if self.angular else []
+        around = [self.angular.combined(reduced.components)] if self.angular else []
         kernels = self.kernels(reduced.model.k)[:, self.flat :]
         return np.hstack([reduced.flat, *around, reduced.signal(kernels)])
 
@@ -287,7 +290,11 @@ class DepartureBasis:
                 self._tables.clear()
             # The first two are by A and width; parameters that move no kernel hold zeros.
             gaussian, slope = self._sensor(place, side)
-            parts = [gaussian[:, None], slope[:, None], np.zeros((place.size, self.flat - 2))]
+            count = self.angular.count if self.angular else 0
+            none = np.zeros((place.size, self.flat - count - 2))
+            parts = [gaussian[:, None], slope[:, None], none]
+            if self.angular:
+                parts.append(self.angular.mean(side.rings, place))
             if self.rings:
                 parts.append(side.rings(Rings.joined(self.rings), place))
             if self.families:
@@ -318,13 +325,16 @@ class DepartureBasis:
 def departure_basis(
     fit: GaussianFit,
     reduced: ReducedScan | None = None,
-    angular: AngularDepartures | None = None,
+    angular: AngularDepartures | PlaneDepartures | None = None,
 ) -> DepartureBasis:
     """Return the kernels of the fit's own parameters and of every shape about it."""
     # With the scan as reduced about the fit, of the families' best fits, too.
     width = max(fit.sigma, _SMALLEST_WIDTH_IN_STEPS * fit.points.step)
-    rings = tuple(shape.rings(width, fit.conversion_constant) for shape in SHAPES)
-    families = () if reduced is None else tuple(_fitted_families(reduced, width))
+    rings: tuple[Rings, ...] = ()
+    families: tuple[FamilyFit, ...] = ()
+    if not isinstance(angular, PlaneDepartures):
+        rings = tuple(shape.rings(width, fit.conversion_constant) for shape in SHAPES)
+        families = () if reduced is None else tuple(_fitted_families(reduced, width))
     flat = fit.jacobian.shape[1] + (angular.count if angular else 0)
     return DepartureBasis(fit.conversion_constant, fit.sigma, flat, rings, families, angular)
 

@@ -7,6 +7,7 @@ on a grid, and at the points by quintic splines through it; its slopes are the s
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cached_property
 from typing import ClassVar, cast
 
@@ -14,6 +15,7 @@ import numpy as np
 import scipy.fft
 
 from memscal.axisymmetry.hankel import RadialSpectrum
+from memscal.axisymmetry.kernels import gaussian_transfer
 from memscal.estimation.forward import ForwardModel, Geometry
 from memscal.model.arrays import FloatArray, IndexArray, array_record, keyword_array_record
 from memscal.model.stress import StressField
@@ -27,7 +29,7 @@ _PER_STEP = 4.0
 class PlaneGeometry(Geometry):
     """Places of the points about trial centres; no Bessel functions."""
 
-    places: FloatArray  # (2, n): rows and columns of the grid
+    places: FloatArray  # (2, n) or (2, n, m): rows and columns of the grid
 
 
 @array_record
@@ -76,8 +78,12 @@ class FieldModel(ForwardModel):
 
     def signal(self, geometry: Geometry, kernel: FloatArray) -> FloatArray:
         """Voltages for kernels in V/Pa by their transforms, shape (nodes,) or (nodes, m)."""
-        columns = [self._read(geometry, k) for k in self._on_cells(np.atleast_2d(kernel.T))]
-        return columns[0] if kernel.ndim == 1 else np.stack(columns, axis=1)
+        columns = np.empty((self.points.u.size, *kernel.shape[1:]))
+        for column, spectrum in zip(
+            np.atleast_2d(columns.T), self._on_cells(np.atleast_2d(kernel.T)), strict=True
+        ):
+            column[:] = self._read(geometry, spectrum)
+        return columns
 
     def shift_derivative(self, geometry: Geometry, kernel: FloatArray) -> FloatArray:
         """Derivatives of :meth:`signal` by each point's centre, shape (2, n), in V/m."""
@@ -114,6 +120,14 @@ class FieldModel(ForwardModel):
         columns = [self._read(geometry, spectrum) for spectrum in spectra]
         return np.stack(columns, axis=1)
 
+    def spotted(self, places: FloatArray, width: float, centres: FloatArray) -> FloatArray:
+        """Voltages of Gaussians of unit integral at places (2, m) from centres, in m: (n, m)."""
+        geometry = self.geometry(centres)
+        plane = self._plane
+        apart = geometry.places[:, :, None] - places[::-1, None] / plane.spacing
+        kernel = gaussian_transfer(np.hypot(plane.ky, plane.kx), width)
+        return self._read(replace(geometry, places=apart), kernel)
+
     def _on_cells(self, kernels: FloatArray) -> FloatArray:
         """Interpolate kernels (m, nodes) to the cells of the plane."""
         from scipy.interpolate import CubicSpline
@@ -122,12 +136,12 @@ class FieldModel(ForwardModel):
         return CubicSpline(self.k, kernels, axis=1)(wavenumbers)
 
     def _read(self, geometry: Geometry, spectrum: FloatArray) -> FloatArray:
-        """Read voltages (n,) at the points for a kernel's transform on the cells."""
+        """Read voltages (n,) or (n, m) at the points for a kernel's transform on the cells."""
         from scipy.ndimage import map_coordinates
 
         plane = self._plane
         places = cast(PlaneGeometry, geometry).places
-        values = np.zeros(self.points.u.size)
+        values = np.zeros(places.shape[1:])
         shape = (plane.count, plane.count)
         for scan, stress in enumerate(plane.stress):
             rows = self.points.scan == scan
@@ -137,7 +151,7 @@ class FieldModel(ForwardModel):
             values[rows] = map_coordinates(
                 splines, places[:, rows], order=5, mode="grid-wrap", prefilter=False
             )
-        return values * self.points.load
+        return (values.T * self.points.load).T
 
 
 @keyword_array_record

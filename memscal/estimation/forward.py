@@ -27,7 +27,8 @@ from typing import TYPE_CHECKING, ClassVar, TypeAlias
 import numpy as np
 from scipy.special import ive, j1
 
-from memscal.axisymmetry.hankel import ACROSS, RadialSpectrum, bessel
+from memscal.axisymmetry.hankel import ACROSS, RadialSpectrum, bessel, radial_spline
+from memscal.axisymmetry.kernels import gaussian_transfer
 from memscal.estimation.points import ScanPoints
 from memscal.estimation.voltage_map import BLOCK, DENSE
 from memscal.model.arrays import BoolArray, FloatArray, array_record
@@ -48,6 +49,8 @@ _TABLE_PHASE = 0.25
 _DEGREE = 7
 #: Few points read a table where its last phase (rad) is less.
 _LONGEST_PHASE = 500.0
+#: Radii of a table of a Gaussian's voltages, over its width.
+_PER_WIDTH = 10
 #: Combinations of waves whose voltages are below this share of the largest one's are left out.
 _NOTHING = 1e-14
 
@@ -336,6 +339,21 @@ class ForwardModel:
         columns[:, : cosines.shape[1]] *= np.cos(angle)[:, None]
         columns[:, cosines.shape[1] :] *= np.sin(angle)[:, None]
         return columns
+
+    def spotted(self, places: FloatArray, width: float, centres: FloatArray) -> FloatArray:
+        """Voltages of Gaussians of unit integral at places (2, m) from centres, in m: (n, m)."""
+        along, across = (
+            np.subtract.outer(*pair) for pair in zip(self.offset(centres), places, strict=True)
+        )
+        distance = np.hypot(along, across)
+        table = np.arange(0.0, distance.max() + width, width / _PER_WIDTH)
+        volts = np.empty(distance.shape)
+        for scan, reference in enumerate(self.references):
+            values = reference.values * gaussian_transfer(self.k, width)
+            profile = reference.wavenumbers.synthesise(values, table)
+            rows = self.points.scan == scan
+            volts[rows] = radial_spline(table, profile)(distance[rows])
+        return self.points.load[:, None] * volts
 
     def _vector_slopes(self, geometry: Geometry, kernel: FloatArray) -> list[FloatArray]:
         """Radial component f of a vector: its derivative by R, and f/R; on the axis the same."""

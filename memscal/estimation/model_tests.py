@@ -252,7 +252,7 @@ def _risen_above(estimate: ProfileEstimate, plateau: BoolArray) -> bool:
     except FitError:
         return False
     angular = estimate.basis.angular
-    reduced = ReducedScan.of(model, fit, weights, angular.rings if angular else None)
+    reduced = ReducedScan.of(model, fit, weights, angular.components if angular else None)
     basis = departure_basis(fit, reduced, angular)
     count = (estimate.outlier_weight * ~plateau)[chosen].sum()
     least = 1.0 if points.u_errors is not None else NUMERICAL_FLOOR * estimate.largest_signal

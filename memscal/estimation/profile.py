@@ -18,6 +18,7 @@ from memscal.estimation.ellipse import elliptic_departure
 from memscal.estimation.forward import ForwardModel, forward_model
 from memscal.estimation.gaussian import GaussianFit, fit_gaussian_to_points
 from memscal.estimation.outliers import OUTLIER_THRESHOLD, RasterNoise, point_weights, raster_noise
+from memscal.estimation.plane import MOST_READINGS, Spots, plane_departures
 from memscal.estimation.points import ScanPoints
 from memscal.estimation.voltage_map import DENSE, VoltageMap, square_root
 from memscal.model.arrays import TINY, BoolArray, FloatArray, IndexArray, array_record
@@ -35,6 +36,8 @@ _WEIGHING_ROUNDS = 4
 _SAME_NOISE = 0.1
 #: Relative step of the derivatives of an ellipse.
 _STEP = 1e-4
+#: A G that is free in the plane is taken where its log evidence is so much larger.
+_CLEARLY = 10.0
 
 
 class CentreError(FitError):
@@ -54,6 +57,11 @@ class ProfileEstimate:
     departures: DepartureBasis  # all kernels, of negligible probability too
     raster_noise: RasterNoise | None = None
     slow: SlowNoise | None = None  # that is counted beside the estimate, which takes noise as white
+
+    @property
+    def free(self) -> bool:
+        """Whether G is free in the plane, and has no shape about one centre."""
+        return self.weighed.free > -np.inf
 
     @property
     def points(self) -> ScanPoints:
@@ -182,9 +190,7 @@ class ProfileEstimate:
                 slope = fit.conversion_constant * (other - oval) / step
                 changes += np.outer(slope, coefficients[row])
         if angular:
-            plane_x, plane_y = np.meshgrid(x, y)
-            coefficients = coefficients[flat - angular.count : flat]
-            changes += angular.at(plane_x.ravel(), plane_y.ravel(), coefficients)
+            changes += angular.at(x, y, coefficients[flat - angular.count : flat])
         return changes
 
     @property
@@ -312,15 +318,26 @@ def _weighed(
     """Weigh departures from a fit for ``count`` readings and a least noise."""
     rings = AngularRings.about(fit) if angular else None
     reduced = ReducedScan.of(model, fit, weights, rings)
-    departures = None
-    if rings:
-        kernels = departure_basis(fit, reduced).kernels(model.k)
-        radial = reduced.signal(kernels[:, fit.jacobian.shape[1] :])
-        columns = (reduced.data, reduced.flat, radial, reduced.rings)
-        departures = angular_departures(rings, fit, columns, noise)
-    basis = departure_basis(fit, reduced, departures)
-    weighing = bayesian.weigh_departures(reduced, basis, count, least_noise=noise)
-    return basis, weighing.average()
+    basis = departure_basis(fit, reduced)
+    noises = {"effective_count": count, "least_noise": noise}
+    if not rings:
+        return basis, bayesian.weigh_departures(reduced, basis, **noises).average()
+    radial = reduced.signal(basis.kernels(model.k)[:, fit.jacobian.shape[1] :])
+    columns = (reduced.data, reduced.flat, radial, reduced.components)
+    basis = departure_basis(fit, reduced, angular_departures(rings, fit, columns, noise))
+    about_centre = bayesian.weigh_departures(reduced, basis, **noises)
+    if fit.points.u.size > MOST_READINGS:
+        return basis, about_centre.average()
+    spots = Spots.about(fit, model, weights, noise)
+    reduced = ReducedScan.of(model, fit, weights, spots)
+    free = plane_departures(spots, fit, (reduced.data, reduced.flat, reduced.components), noise)
+    free_basis = departure_basis(fit, reduced, free)
+    free_weighing = bayesian.weigh_departures(reduced, free_basis, **noises)
+    if free_weighing.evidence < about_centre.evidence + _CLEARLY:
+        return basis, about_centre.average()
+    weighed = free_weighing.average()
+    found = about_centre.log_marginals
+    return free_basis, replace(weighed, log_marginals=found, free=free_weighing.evidence)
 
 
 def log_marginal_likelihood(
@@ -340,7 +357,7 @@ def log_marginal_likelihood(
         # The flat prior of ln(width) has no end there, where the width changes no voltage.
         return np.full(2, -np.inf)
     angular = estimate.basis.angular
-    reduced = ReducedScan.of(model, fit, weights, angular.rings if angular else None)
+    reduced = ReducedScan.of(model, fit, weights, angular.components if angular else None)
     basis = departure_basis(fit, reduced, angular)
     least = _least_noise(fit)
     if estimate.raster_noise is not None:
@@ -534,6 +551,15 @@ def point_messages(estimate: ProfileEstimate) -> list[Message]:
     if points.missing:
         text = f"{points.missing} points of the scan are missing and were left out."
         messages.append(Message("missing_points", text))
+    if estimate.basis.angular and points.u.size > MOST_READINGS:
+        text = (
+            f"Shapes of G that are free in the plane were left out: the raster has "
+            f"{points.u.size:,} readings, and they are weighed for at most {MOST_READINGS:,}."
+        )
+        messages.append(Message("plane", text))
+    elif estimate.free:
+        text = "G is free in the plane: the scan shows that it has no shape about one centre."
+        messages.append(Message("plane", text))
     weight = estimate.outlier_weight
     outliers = np.argsort(weight, kind="stable")[: (weight < OUTLIER_WEIGHT).sum()]
     for i in outliers[:_MOST_LISTED]:

@@ -61,7 +61,7 @@ def free_model(estimate: ProfileEstimate, *, clip_outliers: bool = False) -> Fre
     scaled = fit.jacobian / np.linalg.norm(fit.jacobian, axis=0)
     first = [(u - fit.predicted)[:, None], scaled]
     if basis.angular:
-        first.append(basis.angular.combined(basis.angular.rings.signal(model, fit.centre)))
+        first.append(basis.angular.combined(basis.angular.components.signal(model, fit.centre)))
     columns, mix = model.framed(fit.geometry, first)
     columns = points.standardised(columns, weights, out=columns)
     columns[~ordinary] = 0.0

@@ -10,8 +10,10 @@ from helpers.scans import estimated, simulated
 from scipy.signal import fftconvolve
 
 import memscal
+from memscal.axisymmetry.kernels import Rings
 from memscal.estimation.angular import ORDERS, AngularDepartures, AngularRings
 from memscal.estimation.outliers import raster_noise
+from memscal.estimation.plane import PlaneDepartures, Spots
 from memscal.estimation.points import measured_points
 
 RADII = np.array([0.3e-3, 0.8e-3])
@@ -23,7 +25,7 @@ def test_kernels_are_blurred_rings_of_their_order():
     axis = np.arange(-30, 31) * 0.1e-3
     x, y = (a.ravel() for a in np.meshgrid(axis, axis))
     departures = AngularDepartures(AngularRings(RADII, blur), ONE_EACH)
-    kernels = departures.at(x, y, np.eye(departures.count))
+    kernels = departures.at(axis, axis, np.eye(departures.count))
     angle = np.linspace(0, 2 * np.pi, 400, endpoint=False)
     # A ring is many Gaussians around it, their heights cos and sin of m times the angle.
     for column, (m, turn, q) in enumerate(
@@ -35,7 +37,18 @@ def test_kernels_are_blurred_rings_of_their_order():
         np.testing.assert_allclose(kernels[:, column], ring, atol=2e-5 * np.abs(ring).max())
 
 
-def test_signals_are_the_convolutions_of_the_kernels():
+#: Spots on a lattice beside the centre, one of them left out.
+SPOTS = Spots(np.arange(-1, 2) * 0.7e-3, ~np.eye(3, k=2, dtype=bool), 0.4e-3, np.eye(8))
+
+
+@pytest.mark.parametrize(
+    "departures",
+    [
+        AngularDepartures(AngularRings(RADII, 0.3e-3), ONE_EACH),
+        PlaneDepartures(SPOTS, np.eye(8)[:, 2:7]),
+    ],
+)
+def test_signals_are_the_convolutions_of_the_kernels(departures):
     scan = simulated(raster=True, points=17, half_range=4e-3)
     model = estimated(scan).model
     step = 0.05e-3
@@ -43,10 +56,9 @@ def test_signals_are_the_convolutions_of_the_kernels():
     r = np.linspace(0.0, 17e-3, 2001)
     radial = memscal.indent(scan.film, scan.indenter, load=1.0).base_stress(r)
     stress = np.interp(np.hypot.outer(axis, axis), r, radial)
-    departures = AngularDepartures(AngularRings(RADII, 0.3e-3), ONE_EACH)
     unit = np.eye(departures.count)
-    x, y = (a.ravel() for a in np.meshgrid(axis, axis))
-    kernels = departures.at(x, y, unit).T.reshape(-1, axis.size, axis.size)
+    round_ = departures.mean(Rings.radial, np.hypot.outer(axis, axis).ravel())
+    kernels = (departures.at(axis, axis, unit) + round_).T.reshape(-1, axis.size, axis.size)
     signals = departures.signal(model, np.array([[0.15e-3, -0.1e-3]]), unit)
     rows = np.rint((model.points.y + 0.1e-3) / step).astype(int) + 160
     columns = np.rint((model.points.x - 0.15e-3) / step).astype(int) + 160
