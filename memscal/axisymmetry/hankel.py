@@ -171,7 +171,17 @@ def hankel_transform(r: FloatArray, f: FloatArray, k: FloatArray, *, order: int 
 
 def bessel(order: int, x: FloatArray) -> FloatArray:
     """Bessel function of the first kind, of order zero or more."""
-    return (j0, j1)[order](x) if order < 2 else jv(order, x)
+    if order < 2:
+        return (j0, j1)[order](x)
+    # Beyond the order the upward recurrence (DLMF 10.6.1) is stable, and faster.
+    near = x <= order
+    twice = 2 / np.where(near, 1.0, x)
+    lower = j0(x)
+    value = j1(x)
+    for n in range(1, order):
+        lower, value = value, n * twice * value - lower
+    value[near] = jv(order, x[near])
+    return value
 
 
 def bessel_table(r: FloatArray, k: FloatArray, order: int = 0) -> FloatArray:
