@@ -53,6 +53,10 @@ _LONGEST_PHASE = 500.0
 _PER_WIDTH = 10
 #: Combinations of waves whose voltages are below this share of the largest one's are left out.
 _NOTHING = 1e-14
+#: Combinations of waves are chosen to one of so many distances from the axis to the table's end.
+_REACHES = 32
+#: Waves with less than this share of the largest factor are not summed.
+_NO_SHARE = 1e-17
 
 
 def _wave(wave: int, r: FloatArray, k: FloatArray, across: bool) -> FloatArray:
@@ -93,6 +97,20 @@ def wave_table(wave: int, across: bool, reach: float, nodes: bytes) -> WaveTable
     return WaveTable(radii, values, make_interp_spline(radii, values, k=_DEGREE))
 
 
+@lru_cache(maxsize=8)
+def _seen_waves(
+    wave: int, across: bool, reach: float, nodes: bytes, share: int, factors: bytes
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Singular values (f,) and vectors (f, nodes) of a table times factors; splines (t, f)."""
+    table = wave_table(wave, across, reach, nodes)
+    factor = np.frombuffer(factors)
+    inside = (table.radii >= 0) & (table.radii <= share / _REACHES * reach)
+    _, size, right = np.linalg.svd(table.values[inside] * factor, full_matrices=False)
+    size = size[size > _NOTHING * size[0]]
+    right = right[: size.size]
+    return size, right, table.spline.c @ ((factor[:, None] * right.T) / size)
+
+
 @array_record
 class Geometry:
     """Distances of the points from a trial centre, and sums of waves there."""
@@ -103,30 +121,43 @@ class Geometry:
     across: bool  # whether the scan crosses a slit: with cosines in place of Bessel functions
     reach: float  # of the tables, in m
     _waves: dict[int, FloatArray] = field(default_factory=dict, init=False)  # at the points
+    _interpolations: dict[int, csr_array] = field(default_factory=dict, init=False)
 
     def summed(self, wave: int, spread: FloatArray, rows: Rows = slice(None)) -> FloatArray:
         """Sum a wave over the nodes, by factors (nodes,) or (nodes, m), at some of the points."""
         if self.radius.size > DENSE or wave > 1:
-            return self.interpolation[rows] @ (self.table(wave).spline.c @ spread)
+            count = self._nodes_of(spread)
+            sums = self.table(wave, count).spline.c @ spread[:count]
+            return self.interpolation(count)[rows] @ sums
         if wave not in self._waves:
             # Repeats share their positions: each wave is computed once.
             unique, place = np.unique(self.radius, return_inverse=True)
             if self.reach * self.k[-1] < _LONGEST_PHASE:
-                table = self.table(wave)
+                table = self.table(wave, self.k.size)
                 values = table.spline(np.minimum(unique, table.radii[-1]))
             else:
                 values = _wave(wave, unique, self.k, self.across)
             self._waves[wave] = values[place]
         return self._waves[wave][rows] @ spread
 
-    def table(self, wave: int) -> WaveTable:
-        """The table of a wave."""
-        return wave_table(wave, self.across, self.reach, self.k.tobytes())
+    def table(self, wave: int, count: int) -> WaveTable:
+        """The table of a wave for the first nodes."""
+        return wave_table(wave, self.across, self.reach, self.k[:count].tobytes())
 
-    @cached_property
-    def interpolation(self) -> csr_array:
+    def interpolation(self, count: int) -> csr_array:
         """From coefficients of the tables' splines to the points, shape (n, t), sparse."""
-        return self.table(0).interpolation(self.radius)
+        if count not in self._interpolations:
+            self._interpolations[count] = self.table(0, count).interpolation(self.radius)
+        return self._interpolations[count]
+
+    def _nodes_of(self, spread: FloatArray) -> int:
+        """How many first nodes factors need: all, a half, a quarter and so on."""
+        # A source with an edge has many waves, of which a wide kernel passes few.
+        size = np.abs(spread)
+        used = np.flatnonzero(size > _NO_SHARE * size.max())
+        needed = 1 + (used[-1] // (spread.size // len(spread)) if used.size else 0)
+        halvings = int(np.log2(self.k.size / needed))
+        return int(np.ceil(self.k.size / 2**halvings))
 
 
 # An elliptic Gaussian has the second moments s^2 [[1 + e1, e2], [e2, 1 - e1]], e = |(e1, e2)| and
@@ -248,14 +279,10 @@ class ForwardModel:
         for scan, measure in enumerate(self._measures):
             alike.setdefault(measure.tobytes(), []).append(scan)
         strongest = np.abs(self._measures).max(axis=0)
-        table = geometry.table(self.points.order)
-        # One radius beyond the farthest point is within the reach of its interpolation.
-        farthest = geometry.radius.max() + (table.radii[1] - table.radii[0])
-        inside = (table.radii >= 0) & (table.radii <= farthest)
-        _, size, right = np.linalg.svd(table.values[inside] * strongest, full_matrices=False)
-        size = size[size > _NOTHING * size[0]]
-        right = right[: size.size]
-        splines = table.spline.c @ ((strongest[:, None] * right.T) / size)
+        reach = _REACHES * geometry.radius.max() / geometry.reach
+        table = (self.points.order, geometry.across, geometry.reach, self.k.tobytes())
+        size, right, splines = _seen_waves(*table, int(np.ceil(reach)), strongest.tobytes())
+        interpolation = geometry.interpolation(self.k.size)
         factor = self.points.load
         if self.points.order:
             factor = -factor * geometry.towards[self.axis]
@@ -268,7 +295,7 @@ class ForwardModel:
             own_factor = np.where(np.isin(self.points.scan, scans), factor, 0.0)
             for row in range(0, factor.size, BLOCK):
                 block = slice(row, row + BLOCK)
-                waves = geometry.interpolation[block] @ splines
+                waves = interpolation[block] @ splines
                 columns[block, place] = waves * own_factor[block, None]
             share = self._measures[scans[0]] / np.where(strongest > 0, strongest, 1.0)
             mixes.append(size[:, None] * right * share)
