@@ -18,7 +18,7 @@ from memscal.estimation.forward import ForwardModel, Geometry
 from memscal.estimation.outliers import robust_scale
 from memscal.estimation.points import ScanPoints
 from memscal.estimation.voltage_map import DENSE, VoltageMap, evenly, triangular
-from memscal.model.arrays import TINY, FloatArray, array_record
+from memscal.model.arrays import TINY, FloatArray, IndexArray, array_record
 
 _MOST_STEPS = 20
 _MOST_HALVINGS = 5
@@ -101,9 +101,15 @@ def _require_parity(
 #: Widths from which the search starts, in units of the film's smoothing length.
 _STARTING_WIDTHS = (0.1, 0.3, 0.8)
 #: Of more points as many are fitted at first.
-_MOST_AT_START = 5000
+MOST_AT_START = 5000
 #: Where no film blurs: so many from half a step to a quarter of the span.
 _SOURCE_WIDTHS = 8
+
+
+def some_points(points: ScanPoints) -> IndexArray:
+    """Numbers of the points that are fitted at first, evenly chosen along the scans."""
+    order = np.lexsort((points.x, points.y, points.scan))
+    return np.sort(evenly(order, MOST_AT_START))
 
 
 def _robust_start(model: ForwardModel, weights: FloatArray) -> FloatArray:
@@ -283,10 +289,9 @@ def fit_gaussian_to_points(
     """Fit a Gaussian by weighted least squares, from an earlier fit or a robust global search."""
     points = model.points
     robust = start is None
-    if robust and weights.size > _MOST_AT_START:
-        # Some points, evenly chosen along the scan, give the start for all.
-        order = np.lexsort((points.x, points.y, points.scan))
-        chosen = np.sort(evenly(order, _MOST_AT_START))
+    if robust and weights.size > MOST_AT_START:
+        # They give the start for all.
+        chosen = some_points(points)
         some = replace(model, points=points.selected(chosen))
         start = fit_gaussian_to_points(some, weights[chosen])
     if start is None:

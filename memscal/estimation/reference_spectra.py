@@ -10,7 +10,9 @@ from itertools import product
 import numpy as np
 
 from memscal.axisymmetry.hankel import ACROSS, RadialSpectrum, Wavenumbers, hankel_transform
-from memscal.errors import InputError
+from memscal.errors import FitError, InputError
+from memscal.estimation.forward import ForwardModel
+from memscal.estimation.gaussian import MOST_AT_START, fit_gaussian_to_points, some_points
 from memscal.estimation.points import ScanPoints
 from memscal.estimation.set_up import film_of
 from memscal.mechanics.contact import BaseStress, Contact
@@ -24,9 +26,13 @@ from memscal.progress import Task
 
 #: The film passes nothing of exp(-kh) beyond this: 2e-9 of the load.
 _LARGEST_KH = 20.0
-#: A Gaussian G of half the scan's step passes 3e-9 at this wavenumber times the step. A table's
-#: transform is looked at so many wavenumbers, and ends at this share of its largest.
-_PASSED = 4 * math.pi
+#: A Gaussian G passes 3e-9 at this wavenumber times its width, and 1e-5 at the second, where a
+#: source without an end is cut off. A table's transform is looked at so many wavenumbers, and ends
+#: at this share of its largest.
+_PASSED = 2 * math.pi
+_PASSED_OF_SOURCE = 1.5 * math.pi
+#: The narrowest G is half a step wide; of many points the narrowest kernel by this share of G's.
+_NARROWEST = 0.15
 _WAVENUMBERS = 400
 _NOTHING = 1e-6
 #: A bound, anywhere within which the truth may lie, over its half width: a rectangle.
@@ -99,12 +105,29 @@ def _last_wavenumber(reference: BaseStress, points: ScanPoints) -> float:
     if isinstance(reference, Contact):
         return _LARGEST_KH / reference.film.thickness
     form = reference.form
-    # Of a source without an end, a Gaussian of half the step passes 1e-5 at the last wavenumber.
-    passed = _PASSED if form is None else 0.75 * _PASSED
-    k = np.linspace(0.0, passed / points.step, _WAVENUMBERS)[1:]
+    width = 0.5 * points.step
+    last = _PASSED / width
+    if form is not None:
+        last = _PASSED_OF_SOURCE / max(width, _narrowest_kernel(reference, points))
+    k = np.linspace(0.0, last, _WAVENUMBERS)[1:]
     values = form.transform(k) if form else hankel_transform(reference.r, reference.sigma_zz, k)
     size = np.abs(values)
     return float(k[size > _NOTHING * size.max()][-1])
+
+
+def _narrowest_kernel(reference: StressProfile, points: ScanPoints) -> float:
+    """Width (m) of the narrowest kernel by a fit to some of many points; zero of few."""
+    count = points.u.size
+    if count <= MOST_AT_START:
+        return 0.0
+    some = points.selected(some_points(points))
+    last = _PASSED_OF_SOURCE / (0.5 * points.step * math.sqrt(count / some.u.size))
+    spectra = reference_spectra([reference], [some], Wavenumbers.covering(last, 1.5 * some.span))
+    try:
+        fit = fit_gaussian_to_points(ForwardModel(some, spectra), np.ones_like(some.u))
+    except FitError:
+        return 0.0
+    return _NARROWEST * fit.sigma
 
 
 def _table_spectrum(reference: StressProfile, k: FloatArray, span: float, order: int) -> FloatArray:
