@@ -47,8 +47,10 @@ ComplexArray = NDArray[np.complex128]
 
 #: Windows below this have closed: what they pass of the noise's variance is no larger.
 _CLOSED = 1e-6
-#: Nodes of the posterior's errors for each Gaussian width; columns that are made at a time.
-_PER_WIDTH = 6.0
+#: Nodes of the errors for each Gaussian width: splines through them are right to 2 % of the largest
+#: error.  Radii of a table for each node; columns that are made at a time.
+_PER_WIDTH = 4.0
+_PER_NODE = 3
 _COLUMNS = 16
 
 
@@ -96,7 +98,6 @@ def field_errors(
 
 def _nodes(axis: FloatArray, width: float, reach: float) -> FloatArray:
     """Some nodes of a lattice's axis as far as G reaches, the central one among them."""
-    # As fine as the narrowest kernels.
     middle = axis.size // 2
     every = max(int(width / _PER_WIDTH / (axis[1] - axis[0])), 1)
     nodes: FloatArray = axis[middle % every :: every]
@@ -109,7 +110,7 @@ def _kernels(estimate: ProfileEstimate, x: FloatArray, y: FloatArray) -> ArrayFu
     from scipy.interpolate import CubicSpline
 
     radius = np.hypot.outer(y, x).ravel()
-    step = min(x[1] - x[0], estimate.gaussian.sigma / _PER_WIDTH) / 2
+    step = min(x[1] - x[0], estimate.gaussian.sigma / _PER_WIDTH) / _PER_NODE
     table = np.arange(0.0, radius.max() + 4 * step, step)
     radial = estimate.basis.radial(table)
     rows = max(BLOCK // x.size, 1)
