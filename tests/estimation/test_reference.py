@@ -8,6 +8,7 @@ import pytest
 from helpers.scans import LINEAR_FILM, reference_spectrum, simulated
 
 import memscal
+from memscal.axisymmetry.kernels import blurred_disc
 from memscal.errors import InputError
 from memscal.estimation.points import measured_points
 from memscal.estimation.reference_spectra import film_sensitivities, rod_sensitivities
@@ -135,3 +136,13 @@ def test_sensitivities_are_the_change_of_the_solution_by_one_standard_uncertaint
     np.testing.assert_allclose(
         changes["thickness"], difference, atol=0.02 * np.abs(difference).max()
     )
+
+
+@pytest.mark.parametrize(("side", "narrowest"), [(70, 6e-3 / 69), (141, 0.15e-3)])
+def test_waves_of_a_source_end_by_its_step_or_of_many_readings_by_g(side, narrowest):
+    axis = np.linspace(-6e-3, 6e-3, side)
+    u = blurred_disc(np.hypot.outer(axis, axis), 2e-3, 1e-3)
+    points = measured_points(memscal.Scan(x=axis, y=axis, u_zz=u, load=1.0))
+    source = memscal.IdealReference("disc", 2e-3).profile()
+    last = reference_spectrum(source, points).wavenumbers.k[-1]
+    assert last == pytest.approx(1.5 * np.pi / narrowest, rel=0.02)
