@@ -7,7 +7,6 @@ import secrets
 import shutil
 import signal
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 # Before numpy loads: threads on matrices as small as ours cost ten times the work itself.
@@ -21,7 +20,7 @@ if hasattr(signal, "SIGHUP"):
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
 import pytest  # noqa: E402
-from helpers.console import Outcome, Run  # noqa: E402
+from helpers.console import Outcome  # noqa: E402
 from helpers.nexus import definitions_folder, structure, violations  # noqa: E402
 from helpers.scans import known_apparatus, simulate  # noqa: E402
 from hypothesis import settings  # noqa: E402
@@ -39,26 +38,26 @@ REMEMBERING = ("memscal.mechanics.solver.refinement", "memscal.extensions.finite
 FULL_STUDY = bool(os.environ.get("MEMSCAL_FULL_STUDY"))
 
 
-def pytest_report_header() -> list[str]:
+def pytest_report_header():
     """Say in the head of a report what is not run."""
     text = "studies: reduced; those marked full_study are deselected (set MEMSCAL_FULL_STUDY)"
     return [] if FULL_STUDY else [text]
 
 
-def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+def pytest_collection_modifyitems(config, items):
     """Deselect the studies that have no reduced form."""
     full = [item for item in items if item.get_closest_marker("full_study") and not FULL_STUDY]
     config.hook.pytest_deselected(items=full)
     items[:] = [item for item in items if item not in full]
 
 
-def pytest_collection_finish() -> None:
+def pytest_collection_finish():
     """Keep what was collected out of later searches for garbage, of which each would visit it."""
     gc.freeze()
 
 
 @pytest.fixture
-def seed() -> int:
+def seed():
     """Return another seed in every run; the log of a failed test names it."""
     value = secrets.randbits(32)
     logging.getLogger(__name__).info("seed %d", value)
@@ -66,13 +65,13 @@ def seed() -> int:
 
 
 @pytest.fixture(scope="session", autouse=True)
-def _every_file_is_valid(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+def _every_file_is_valid(tmp_path_factory):
     """Validate the files that tests write against our application definitions."""
     encode = writer.tree_to_bytes
     seen = set[frozenset[str]]()
     folder = tmp_path_factory.mktemp("nexus")
 
-    def validated(root: writer.Group) -> bytes:
+    def validated(root):
         data = encode(root)
         layout = structure(root)
         if layout not in seen and root.attributes.get(writer.SCHEMA_ATTRIBUTE) in writer.DEFINED:
@@ -90,8 +89,8 @@ def _every_file_is_valid(tmp_path_factory: pytest.TempPathFactory) -> Iterator[N
 
 @pytest.fixture(scope="session", autouse=True)
 def _contacts_are_kept_for_this_run_alone(
-    tmp_path_factory: pytest.TempPathFactory,
-) -> Iterator[None]:
+    tmp_path_factory,
+):
     """Share calculated contacts among tests and workers, and begin from cold."""
     base = tmp_path_factory.getbasetemp()
     shared = base.parent if "PYTEST_XDIST_WORKER" in os.environ else base
@@ -101,7 +100,7 @@ def _contacts_are_kept_for_this_run_alone(
 
 
 @pytest.fixture(scope="module", autouse=True)
-def _forget_what_was_solved(request: pytest.FixtureRequest) -> Iterator[None]:
+def _forget_what_was_solved(request):
     """Free the contacts and meshes that a file's tests kept: gigabytes, over all files."""
     yield
     for module in (request.module, *(sys.modules.get(name) for name in REMEMBERING)):
@@ -112,10 +111,10 @@ def _forget_what_was_solved(request: pytest.FixtureRequest) -> Iterator[None]:
 
 
 @pytest.fixture
-def run(capsys: pytest.CaptureFixture[str]) -> Run:
+def run(capsys):
     """Run ``memscal`` with arguments."""
 
-    def run_(*arguments: object) -> Outcome:
+    def run_(*arguments):
         capsys.readouterr()
         code = main([str(argument) for argument in arguments])
         printed = capsys.readouterr()
@@ -125,7 +124,7 @@ def run(capsys: pytest.CaptureFixture[str]) -> Run:
 
 
 @pytest.fixture(scope="session")
-def good_scan(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def good_scan(tmp_path_factory):
     """A scan with nothing wrong in it."""
     path = tmp_path_factory.mktemp("good") / "scan.h5"
     memscal.write_scan(memscal.simulate(seed=1), path)
@@ -133,7 +132,7 @@ def good_scan(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="session")
-def drifting_scan(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def drifting_scan(tmp_path_factory):
     """A scan whose baseline drifts by far more than the quality check allows."""
     path = tmp_path_factory.mktemp("drifting") / "scan.h5"
     memscal.write_scan(simulate(seed=1, drift=0.2), path)
@@ -141,7 +140,7 @@ def drifting_scan(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def folder(tmp_path, monkeypatch):
     """An empty folder to work in."""
     work = tmp_path / "work"
     work.mkdir()
@@ -150,13 +149,13 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.fixture
-def scan(good_scan: Path, folder: Path) -> Path:
+def scan(good_scan, folder):
     """A copy of the good scan in the folder."""
     return Path(shutil.copy(good_scan, folder / "scan.h5"))
 
 
 @pytest.fixture(scope="session")
-def known_artifact(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def known_artifact(tmp_path_factory):
     """A sensor whose G and A are known."""
     path = tmp_path_factory.mktemp("known") / "sensor.apparatus.h5"
     known_apparatus(conversion_uncertainty=0.005, width_uncertainty=0.01).save(path)
@@ -164,6 +163,6 @@ def known_artifact(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def artifact(known_artifact: Path, folder: Path) -> Path:
+def artifact(known_artifact, folder):
     """A copy of the known sensor in the folder."""
     return Path(shutil.copy(known_artifact, folder))

@@ -1,8 +1,6 @@
 """The apparatus function in use, against closed forms and direct quadrature."""
 
-from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -16,11 +14,9 @@ from scipy.integrate import dblquad
 from scipy.stats import chi2, ncx2, norm
 
 import memscal
-from memscal import ApparatusFunction
 from memscal.axisymmetry.kernels import unit_gaussian
 from memscal.errors import InputError
 from memscal.model.apparatus import ApparatusField, ApparatusRadial, ParameterSet, TransferFunction
-from memscal.model.arrays import FloatArray
 
 SUPPORT = 6e-3
 DRAWS = 40 if FULL else 12
@@ -31,7 +27,7 @@ X = np.linspace(-8e-3, 8e-3, 101)
 Y = np.linspace(-9e-3, 9e-3, 91)
 
 
-def with_kernel(kernel: Callable[[FloatArray], FloatArray]) -> ApparatusFunction:
+def with_kernel(kernel):
     """An apparatus function of this radial profile, tabulated out to 6 mm."""
     r = np.linspace(0.0, SUPPORT, 401)
     g = kernel(r)
@@ -43,7 +39,7 @@ def with_kernel(kernel: Callable[[FloatArray], FloatArray]) -> ApparatusFunction
 
 
 @pytest.fixture(scope="module")
-def apparatus() -> ApparatusFunction:
+def apparatus():
     """A Gaussian apparatus function of 561 um."""
     return with_kernel(lambda r: unit_gaussian(r, SIGMA))
 
@@ -66,7 +62,7 @@ IDEAL = {
 
 
 @pytest.fixture(scope="module")
-def alike(apparatus) -> ApparatusFunction:
+def alike(apparatus):
     """The same, with errors of G that all radii share."""
     radial = apparatus.radial_profile
     radial = replace(radial, g_covariance=np.outer(radial.g_errors, radial.g_errors))
@@ -116,14 +112,14 @@ def test_over_the_plane_what_is_uncertain_beside_the_profile_adds_to_a_predictio
 
 @pytest.mark.parametrize("place", [0.0, 0.7e-3, 2.3e-3])
 def test_the_convolution_is_the_double_integral_at_a_point(place):
-    def kernel(r: Any) -> Any:
+    def kernel(r):
         return 1.5 * unit_gaussian(r, 0.6e-3) - 0.5 * unit_gaussian(r, 0.4e-3)
 
     # A stress with a flank, 1/(1 + (r/w)^4), which is no sum of Gaussians.
-    def stress(r: Any) -> Any:
+    def stress(r):
         return 1e5 / (1 + (r / 1e-3) ** 4)
 
-    def integrand(angle: float, s: float) -> float:
+    def integrand(angle, s):
         distance = np.sqrt(place**2 + s**2 - 2 * place * s * np.cos(angle))
         return float(2 * s * kernel(s) * stress(distance))
 
@@ -135,7 +131,7 @@ def test_the_convolution_is_the_double_integral_at_a_point(place):
     assert found[at] == pytest.approx(direct, rel=1e-5)
 
 
-def elliptic(x: FloatArray, y: FloatArray, covariance: FloatArray) -> FloatArray:
+def elliptic(x, y, covariance):
     """Gaussian of unit integral at positions (y, x)."""
     places = np.stack(np.meshgrid(x, y), axis=-1)
     form = np.einsum("...i,ij,...j", places, np.linalg.inv(covariance), places)

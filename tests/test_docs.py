@@ -16,7 +16,7 @@ import jupytext
 import pytest
 from helpers.bench import Bench
 from helpers.bounds import FULL
-from helpers.console import Outcome, Run, numbers, words
+from helpers.console import numbers, words
 from helpers.scans import simulate
 
 import memscal
@@ -30,21 +30,21 @@ NOTEBOOKS = DOCS.with_name("notebooks")
 FRONT = ("README.md", "CHANGELOG.md")
 
 
-def text_of(path: Path) -> str:
+def text_of(path):
     return path.read_text(encoding="utf-8")
 
 
-def cells_of(line: str) -> list[str]:
+def cells_of(line):
     return [cell.strip() for cell in line.split("|")[1:-1]]
 
 
-def pair(cell: str) -> list[float]:
+def pair(cell):
     """Numbers of a cell: incremental and total loading."""
     return [float(text) for text in cell.removeprefix("radius").split("/")]
 
 
 @lru_cache
-def sphere_table(ratio: float) -> dict[tuple[str, str], list[str]]:
+def sphere_table(ratio):
     """Cells of the table of the paper's sphere, as its script prints them, by load and friction."""
     frictions = (0.0, 0.2, math.inf) if ratio == 0.5 else (0.0, math.inf)
     every = {} if FULL else {"frictions": frictions}
@@ -52,7 +52,7 @@ def sphere_table(ratio: float) -> dict[tuple[str, str], list[str]]:
     return {(load, friction): cells for load, friction, *cells in map(cells_of, rows[2:])}
 
 
-def stated_rows(section: str) -> list[list[str]]:
+def stated_rows(section):
     text = text_of(DOCS / "sphere.md").split(f"## {section}\n")[1]
     return [cells_of(line) for line in text.split("##")[0].splitlines() if line.startswith("| ")][
         1:
@@ -82,9 +82,9 @@ def test_the_comparison_with_the_paper_s_sphere_is_by_the_same_script():
 
 
 @pytest.fixture(scope="module")
-def kinds() -> dict[str, list[dict[str, str]]]:
+def kinds():
     """The cases of the study of the Bayesian estimate, by the kind of sensor."""
-    kinds: dict[str, list[dict[str, str]]] = {}
+    kinds = {}
     with (DOCS / "estimation_study.csv").open(encoding="utf-8", newline="") as file:
         for case in csv.DictReader(file):
             kind = re.match(r"[a-zA-Z ]+", case["G (lengths in mm)"])[0].strip()
@@ -112,7 +112,7 @@ def test_a_page_sums_up_the_study_of_the_bayesian_estimate(page, columns, kinds)
             assert sorted(set(stated)) == sorted(ends), (kind, name)
 
 
-def cells(path: Path) -> list[tuple[str, str]]:
+def cells(path):
     return [(cell.cell_type, cell.source) for cell in jupytext.read(path).cells]
 
 
@@ -125,7 +125,7 @@ def test_every_notebook_has_its_script_and_says_the_same():
         assert cells(script) == cells(books[name]), f"jupytext --sync notebooks/{name}.py"
 
 
-def blocks(page: str, language: str) -> list[str]:
+def blocks(page, language):
     """Return the blocks of code of a page."""
     text = text_of(DOCS / page)
     return re.findall(rf"^```{language}\n(.*?)^```$", text, flags=re.MULTILINE | re.DOTALL)
@@ -155,7 +155,7 @@ def test_every_option_in_the_documentation_exists():
     assert unknown == []
 
 
-def follow(page: str, run: Run) -> dict[str, Outcome]:
+def follow(page, run):
     """Run the commands of a page, in the working folder; return what each printed."""
     outcomes = {}
     for line in "".join(blocks(page, "console")).splitlines():
@@ -181,9 +181,9 @@ def test_the_page_on_incomplete_scans_calibrates_them(folder, run, capsys):
     assert 0 < abs(ratio - 1) < 3 * u < 0.1
 
 
-def run_examples(page: str) -> dict[str, object]:
+def run_examples(page):
     """Run the Python of a page, as a module of its name; return its names."""
-    names: dict[str, object] = {"__name__": page.removesuffix(".md")}
+    names = {"__name__": page.removesuffix(".md")}
     for example in blocks(page, "python"):
         exec(compile(example, page, "exec"), names)
     return names
@@ -294,7 +294,7 @@ def test_the_recipe_with_pymeasure_records_a_scan_that_can_be_calibrated(
     scan = simulate(points=33, noise=0.0)
     bench = Bench(scan, noise=0.005 * scan.u_zz.max(), seed=seed)
     procedure, run = blocks("acquisition.md", "python")
-    names: dict[str, object] = {"__name__": "recipe"}
+    names = {"__name__": "recipe"}
     exec(compile(procedure, "acquisition.md", "exec"), names)
     names |= {"STAGE": bench.stage, "VOLTMETER": bench.voltmeter, "sleep": lambda _: None}
     exec(compile(run, "acquisition.md", "exec"), names)

@@ -4,7 +4,6 @@ import ast
 import re
 import tomllib
 from collections import Counter
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -100,18 +99,18 @@ NAMESAKES = {
 """One subject in several rooms: what is computed with the records of the model."""
 
 
-def room(module: str) -> str:
+def room(module):
     """The folder, or the module at the top, that a module of ours belongs to."""
     return [*module.split("."), "__init__"][1]
 
 
-def extension(module: str) -> str:
+def extension(module):
     """The extension that a module belongs to; empty for the core."""
     parts = module.split(".")
     return parts[2] if parts[1] == "extensions" and len(parts) > 3 else ""
 
 
-def imported(tree: ast.AST) -> Iterator[str]:
+def imported(tree):
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
@@ -121,14 +120,14 @@ def imported(tree: ast.AST) -> Iterator[str]:
             yield from (f"{node.module}.{alias.name}" for alias in node.names)
 
 
-def without_types(tree: ast.Module) -> ast.Module:
+def without_types(tree):
     """Leave out what is imported for annotations only."""
     tests = [(node, node.test) for node in tree.body if isinstance(node, ast.If)]
     left_out = [node for node, test in tests if ast.unparse(test) == "TYPE_CHECKING"]
     return ast.Module([node for node in tree.body if node not in left_out], type_ignores=[])
 
 
-def allowed_rooms(importer: str) -> set[str]:
+def allowed_rooms(importer):
     if importer == "formats":
         return {*FLOW[: FLOW.index("readings") + 1], "formats"}
     earlier = set(FLOW[: FLOW.index(importer) + 1])
@@ -136,12 +135,12 @@ def allowed_rooms(importer: str) -> set[str]:
 
 
 @pytest.fixture(scope="module")
-def trees() -> dict[str, ast.Module]:
+def trees():
     return {name: ast.parse(path.read_text("utf-8")) for name, path in MODULES.items()}
 
 
 @pytest.fixture(scope="module")
-def arrows(trees: dict[str, ast.Module]) -> dict[str, set[str]]:
+def arrows(trees):
     """The modules of ours that each module imports, wherever in it and for whatever use."""
     modules = {name.removesuffix(".__init__") for name in trees}
     return {
@@ -219,7 +218,7 @@ def test_no_modules_import_each_other_in_a_circle(arrows):
 
 
 def test_a_name_stands_for_one_thing(trees):
-    owners: dict[str, list[str]] = {}
+    owners = {}
     for name in trees:
         if room(name) not in ONE_ROLE and not name.endswith("__init__"):
             owners.setdefault(name.rpartition(".")[2], []).append(name)
@@ -250,12 +249,12 @@ def test_the_map_of_the_house_has_a_line_for_every_room():
 
 
 @pytest.fixture(scope="module")
-def read() -> dict[str, Counter[str]]:
+def read():
     """What there is to read in every module."""
     return {name: measures(path) for name, path in MODULES.items()}
 
 
-def within(budget: dict[str, int], found: Counter[str]) -> list[str]:
+def within(budget, found):
     """Lines that say where more was found than the budget allows, or a line is missing."""
     lines = [f"{name}: no budget" for name in found if name not in budget]
     return lines + [

@@ -3,10 +3,9 @@
 import json
 import subprocess
 import sys
-from collections.abc import Iterator
 from inspect import isfunction
 from pathlib import Path
-from typing import Any, get_args, get_type_hints
+from typing import get_args, get_type_hints
 
 import pytest
 
@@ -36,10 +35,10 @@ print(json.dumps(sorted(roots - sys.stdlib_module_names)), file=sys.stderr)
 """
 
 
-def libraries_after(code: str) -> set[str]:
+def libraries_after(code):
     """Libraries in a fresh interpreter after some code, without those that were there before."""
 
-    def loaded(start: str) -> set[str]:
+    def loaded(start):
         script = f"import atexit\natexit.register(lambda: exec({LIST_LIBRARIES!r}))\n{start}"
         run = subprocess.run(
             [sys.executable, "-c", script], capture_output=True, text=True, check=False
@@ -82,7 +81,7 @@ def test_help_and_a_plain_calibration_load_no_extension(arguments, tmp_path):
     assert run.stdout.splitlines()[-1] == "[]"
 
 
-def classes(hint: Any) -> Iterator[type]:
+def classes(hint):
     """The classes of memscal that a type hint names."""
     if isinstance(hint, type) and hint.__module__.startswith("memscal."):
         yield hint
@@ -90,7 +89,7 @@ def classes(hint: Any) -> Iterator[type]:
         yield from classes(argument)
 
 
-def offered(public: Any) -> Iterator[Any]:
+def offered(public):
     """The type hints of what a public function returns, or of a public class's attributes."""
     names = {name: getattr(memscal, name) for name in memscal.__all__}
     members = [public]

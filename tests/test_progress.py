@@ -13,12 +13,12 @@ FILM = memscal.ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-
 SPHERE = memscal.Sphere(radius=128.8e-3)
 
 
-def told(heard: list[memscal.Progress]) -> list[tuple[str, float, float]]:
+def told(heard):
     return [(one.task, one.done, one.total) for one in heard]
 
 
 def test_only_the_outermost_task_is_told_of():
-    heard: list[memscal.Progress] = []
+    heard = []
     with reporting(heard.append):
         inner = (list(Task("inner", 2).counted("ab")) for _ in range(2))
         list(Task("outer", 2).counted(inner))
@@ -28,7 +28,7 @@ def test_only_the_outermost_task_is_told_of():
 
 
 def test_what_consumes_a_task_hears_of_its_own_work():
-    heard: list[memscal.Progress] = []
+    heard = []
     with reporting(heard.append):
         for _ in Task("items", 2).counted("ab"):
             Task("own", 1).tell(1)
@@ -36,7 +36,7 @@ def test_what_consumes_a_task_hears_of_its_own_work():
 
 
 def test_public_functions_tell_their_callback(tmp_path):
-    heard: list[memscal.Progress] = []
+    heard = []
     sensor = known_apparatus(conversion_uncertainty=0.005, width_uncertainty=0.01)
     scan = contact_scan(load=(1.0, 2.0), film=sensor.film)
     stress = memscal.measure_stress(scan, sensor, progress=heard.append)
@@ -76,7 +76,7 @@ def test_a_bar_is_shown_in_a_notebook_and_a_line_elsewhere(capsys, monkeypatch):
     pytest.importorskip("ipykernel")
     shell = types.SimpleNamespace(kernel=None)
     monkeypatch.setattr("IPython.get_ipython", lambda: shell)
-    shown: list[str] = []
+    shown = []
     handle = types.SimpleNamespace(update=lambda page: shown.append(page.data))
     monkeypatch.setattr("IPython.display.display", lambda *_, **__: handle)
     with reporting(True):

@@ -20,14 +20,14 @@ EXAMPLES = re.findall(r"^```python\n(.*?)^```$", README, flags=re.MULTILINE | re
 
 
 @pytest.fixture
-def fresh_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def fresh_folder(tmp_path, monkeypatch):
     """A folder that holds the shipped data and nothing else."""
     shutil.copytree(ROOT / "calibration_data", tmp_path / "calibration_data")
     monkeypatch.chdir(tmp_path)
     return tmp_path
 
 
-def run_installed(arguments: list[str]) -> list[str]:
+def run_installed(arguments):
     """Run the installed program; return the lines that it prints."""
     installed = os.fspath(Path(sys.executable).with_name("memscal"))
     run = subprocess.run([installed, *arguments], capture_output=True, text=True, check=False)
@@ -58,7 +58,7 @@ def test_the_example_in_python_runs(monkeypatch):
     if not FULL:
         few = (0.0, 0.1, 0.2, 0.3, math.inf)
         monkeypatch.setattr("memscal.friction.compare.FRICTIONS", few)
-    names: dict[str, object] = {}
+    names = {}
     [example] = EXAMPLES
     exec(compile(example, "README.md", "exec"), names)
     fitted = names["fitted"]

@@ -1,7 +1,6 @@
 """Results of a calibration show themselves as the command line, JSON and arrays say it."""
 
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,26 +11,26 @@ import memscal
 
 
 @pytest.fixture(scope="module")
-def scan(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def scan(tmp_path_factory):
     path = tmp_path_factory.mktemp("results") / "scan.h5"
     memscal.write_scan(simulate(seed=1, points=33, drift=0.2), path)
     return path
 
 
 @pytest.fixture(scope="module")
-def calibration(scan: Path) -> memscal.Calibration:
+def calibration(scan):
     return memscal.calibrate(scan)
 
 
 @pytest.fixture(scope="module")
-def loaded(calibration: memscal.Calibration, scan: Path) -> memscal.ApparatusFunction:
+def loaded(calibration, scan):
     path = scan.with_name("saved.h5")
     calibration.apparatus.save(path)
     return memscal.load_apparatus(path)
 
 
 @pytest.fixture(scope="module")
-def drawn(calibration: memscal.Calibration) -> memscal.MonteCarlo:
+def drawn(calibration):
     return memscal.monte_carlo(calibration, draws=6, seed=4)
 
 

@@ -3,27 +3,23 @@
 import json
 import math
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
 from helpers.friction_results import LOADS, comparison, interface_comparison
 
-from memscal import BoundedEstimate, FrictionComparison, Interval
+from memscal import BoundedEstimate, Interval
 from memscal.friction.checks import comparison_checks
 from memscal.friction.effective import bracketed_share
-from memscal.model.checks import QualityCheck
 from memscal.summaries.comparison import notes
 
 
 @pytest.fixture(scope="module")
-def found() -> FrictionComparison:
+def found():
     return comparison(interface=interface_comparison(1.8e-6))
 
 
-def reading(
-    value: float | None, low: float, high: float | None, *, u: float | None = 0.02, **fields: Any
-) -> BoundedEstimate:
+def reading(value, low, high, *, u=0.02, **fields):
     made = BoundedEstimate(
         value=value,
         standard_uncertainty=u,
@@ -95,7 +91,7 @@ def test_points_within_both_extremes_and_their_uncertainty_are_bracketed():
 
 
 def test_lubricated_loads_that_exclude_no_friction_fail_their_check():
-    def check(rise: float) -> QualityCheck:
+    def check(rise):
         along = np.array([30.0 + rise, 30.0, 60.0])
         joint = {"lubricated": {"total": reading(0.1, 0.05, 0.2, deviance=along)}}
         return comparison_checks({}, joint)[-1]

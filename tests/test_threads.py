@@ -3,8 +3,6 @@
 import os
 import subprocess
 import sys
-from collections.abc import Iterator
-from typing import Any
 
 import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
@@ -13,12 +11,12 @@ import memscal
 from memscal.parallel import THREAD_VARIABLES, single_threaded, worker_pool
 
 
-def blas_threads() -> set[int]:
+def blas_threads():
     return {pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas"}
 
 
 @pytest.fixture
-def two_threads(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+def two_threads(monkeypatch):
     """A process whose BLAS runs two threads, and whose user asked for no number."""
     for name in THREAD_VARIABLES:
         monkeypatch.delenv(name, raising=False)
@@ -60,10 +58,10 @@ def test_the_limit_holds_while_a_pool_of_processes_is_open():
 
 @pytest.mark.usefixtures("two_threads")
 def test_a_public_function_computes_on_one_thread():
-    during: list[set[int]] = []
+    during = []
 
     class Watching(memscal.GaussianMixture):
-        def __getattribute__(self, name: str) -> Any:
+        def __getattribute__(self, name):
             during.append(blas_threads())
             return super().__getattribute__(name)
 

@@ -24,7 +24,7 @@ METHODS = ("white-noise", "bayesian")
 
 
 @cache
-def found(method: str, parabola: float, held: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def found(method, parabola, held):
     """Errors over uncertainties, relative uncertainties, and whether a scan has no alarm."""
     world = replace(ROUND, parabola=parabola)
     z = []

@@ -16,7 +16,7 @@ from helpers.scans import CONVERSION, GAUSSIAN, SIGMA, TAILS, simulate
 from scipy.stats import chi2, norm
 
 import memscal
-from memscal import Plan, Scan
+from memscal import Plan
 from memscal.extensions.simulation.rod_scan import PAPER_FILM
 
 pytestmark = pytest.mark.accuracy
@@ -28,7 +28,7 @@ TRUTHS = {"conversion_constant": CONVERSION, "gaussian_sigma": SIGMA}
 LAWLESS = replace(PAPER_FILM, law="")
 
 
-def drawn(scan: Scan, seed: int) -> Scan:
+def drawn(scan, seed):
     """The scan with film, rod and load as stated by their uncertainties about the true ones."""
     rng = np.random.default_rng([35, seed])
     film = replace(
@@ -41,7 +41,7 @@ def drawn(scan: Scan, seed: int) -> Scan:
     return replace(scan, film=film, load=load, load_uncertainty=0.01 * load)
 
 
-def deviations(scans: list[Scan], **options: object) -> np.ndarray:
+def deviations(scans, **options):
     """Errors of A and sigma over their stated uncertainties, a row for each scan."""
     rows = []
     for scan in scans:
@@ -50,12 +50,12 @@ def deviations(scans: list[Scan], **options: object) -> np.ndarray:
     return np.array(rows)
 
 
-def margin(z: np.ndarray) -> np.ndarray:
+def margin(z):
     """What chance adds to a mean."""
     return norm.isf(CHANCE) * np.std(z, axis=0, ddof=1) / math.sqrt(len(z))
 
 
-def direct(law: str, stated: str) -> list[Scan]:
+def direct(law, stated):
     """Scans at 1 N by finite elements and direct convolution, of a rod that sticks."""
     scans = []
     for seed in range(SEEDS):

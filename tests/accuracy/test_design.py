@@ -14,7 +14,7 @@ from helpers.scans import simulate
 from scipy.stats import chi2
 
 import memscal
-from memscal import ParameterSet, Plan
+from memscal import Plan
 from memscal.extensions.simulation.rod_scan import PAPER_FILM
 
 pytestmark = pytest.mark.accuracy
@@ -30,7 +30,7 @@ DEVIATIONS = 3.9
 NAMES = ("conversion_constant", "gaussian_sigma", "fwhm")
 
 
-def random_plan(number: int) -> Plan:
+def random_plan(number):
     """Draw a plan: film, width of G, step, range, repeats and noise."""
     rng = np.random.default_rng([2026, number])
     thickness = rng.uniform(1.0e-3, 2.5e-3)
@@ -61,9 +61,7 @@ class Study:
     found: np.ndarray
 
 
-def shares(
-    parameters: ParameterSet, r: np.ndarray, errors: np.ndarray, sigma: float
-) -> list[float]:
+def shares(parameters, r, errors, sigma):
     """Relative u of the parameters, and of G: its root mean square over a disc of two widths."""
     inside = r < 2 * sigma
     weight = r[inside] / r[inside].sum()
@@ -71,7 +69,7 @@ def shares(
     return [*(parameters.uncertainty(name) / parameters[name] for name in NAMES), of_g]
 
 
-def scan_of(plan: Plan, seed: int) -> memscal.Scan:
+def scan_of(plan, seed):
     """Simulate a scan as it is planned."""
     return simulate(
         film=plan.film,
@@ -88,7 +86,7 @@ def scan_of(plan: Plan, seed: int) -> memscal.Scan:
 
 
 @lru_cache(maxsize=DESIGNS)
-def study(number: int) -> Study:
+def study(number):
     plan = random_plan(number)
     sigma = plan.kernel.sigmas[0]
     planned = memscal.design(**{name: getattr(plan, name) for name in Plan.__dataclass_fields__})
@@ -109,7 +107,7 @@ def study(number: int) -> Study:
     return Study(*(np.asarray(values) for values in arrays))
 
 
-def margin(values: np.ndarray) -> np.ndarray:
+def margin(values):
     """Relative standard error of a root mean square, from the sample's own spread."""
     squares = values**2
     return np.asarray(np.std(squares, axis=0) / np.sqrt(len(values)) / (2 * squares.mean(axis=0)))

@@ -25,7 +25,7 @@ SEEDS, SIDE = (6, 48) if FULL else (2, 36)
 INSIDE = np.arange(-5e-3, 5e-3, 0.25e-3)
 
 
-def lobes(near: float, far: float, distance: float) -> tuple[Part, Part]:
+def lobes(near, far, distance):
     """Two Gaussians of these widths, so far apart along x, in m."""
     return (
         Part(0.5, (near, near), (-distance / 2, 0.3e-3)),
@@ -45,7 +45,7 @@ STEADY = [kind for kind in STUDIED if kind != "stage"]
 
 
 @cache
-def volts(parts: tuple[Part, ...], side: int, radius: float) -> RectBivariateSpline:
+def volts(parts, side, radius):
     """Voltages over the plane per unit of the disc, in V, by positions y, x in m."""
     count = 3 * side * FINER
     k = 2 * np.pi * fftfreq(count, STEP / FINER)
@@ -57,7 +57,7 @@ def volts(parts: tuple[Part, ...], side: int, radius: float) -> RectBivariateSpl
     return RectBivariateSpline(axis, axis, field)
 
 
-def raster(kind: str, seed: int, noise: float = 0.003) -> memscal.Scan:
+def raster(kind, seed, noise=0.003):
     """A raster of a disc, of noise that is not stated."""
     parts, side, stage, ratio = KINDS[kind]
     rng = np.random.default_rng(seed)
@@ -70,13 +70,13 @@ def raster(kind: str, seed: int, noise: float = 0.003) -> memscal.Scan:
 
 
 @cache
-def calibrated(kind: str, seeds: int = SEEDS) -> list[memscal.Calibration]:
+def calibrated(kind, seeds=SEEDS):
     disc = memscal.IdealReference("disc", RADIUS)
     scans = [raster(kind, seed) for seed in range(seeds)]
     return [memscal.calibrate(scan, reference=disc, other=False) for scan in scans]
 
 
-def on_plane(calibration: memscal.Calibration, name: str):
+def on_plane(calibration, name):
     p = calibration.apparatus.parameters
     field = calibration.apparatus.field
     at = RectBivariateSpline(field.y, field.x, getattr(field, name))

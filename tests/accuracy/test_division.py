@@ -53,7 +53,7 @@ LIMITS = {
 A_LIMITS = dict(zip(NOISES, (0.003, 0.015, 0.045), strict=True))  # RMS error
 
 
-def case_of(kind: str, noise: float) -> Case:
+def case_of(kind, noise):
     kernel = OTHERS.get(kind) or memscal.GaussianMixture((1.0,), (WIDTHS[noise],))
     return Case(kind, kernel, noise, 0.25e-3, 1, off=True)
 
@@ -62,16 +62,16 @@ CASES = [case_of(kind, noise) for kind in LIMITS for noise in NOISES]
 GAUSSIANS = [case for case in CASES if case.sigma is not None]
 
 
-def seeds_of(case: Case) -> int:
+def seeds_of(case):
     return 200 if FULL else 8 if case in GAUSSIANS else 3
 
 
-def agreement(apparatus: memscal.ApparatusFunction) -> memscal.QualityCheck:
+def agreement(apparatus):
     return next(check for check in apparatus.checks if check.name == "method_agreement")
 
 
 @lru_cache
-def study(case: Case) -> tuple[Outcome, dict[str, np.ndarray]]:
+def study(case):
     """Outcome of every seed's scan by the default method, and what its fit and checks find."""
     rows = []
     for seed in range(seeds_of(case)):
@@ -167,7 +167,7 @@ def test_a_raster_scatters_by_no_more_than_is_stated():
 PASSES = 200 if FULL else 4
 
 
-def of_repeats(noise: float, seed: int, shift: float, **options) -> memscal.ApparatusFunction:
+def of_repeats(noise, seed, shift, **options):
     """Calibrate with three passes over a Gaussian sensor, which moves from one to the next."""
     passes = [case_of("Gaussian", noise).scan(3 * seed + i) for i in range(3)]
     moved = [scan.x + i * shift for scan, i in zip(passes, (-1, 0, 1), strict=True)]

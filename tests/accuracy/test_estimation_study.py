@@ -40,7 +40,7 @@ DISC = memscal.SmoothedDisc(0.8e-3, 0.05e-3)
 
 
 @lru_cache
-def stated() -> list[list[str]]:
+def stated():
     """Cells of the cases in docs/estimation_study.csv."""
     with (DOCS / "estimation_study.csv").open(encoding="utf-8", newline="") as file:
         head, *rows = csv.reader(file)
@@ -49,7 +49,7 @@ def stated() -> list[list[str]]:
 
 
 @lru_cache
-def script() -> dict[str, object]:
+def script():
     return runpy.run_path(str(DOCS / "estimation_table.py"))
 
 
@@ -80,7 +80,7 @@ def test_a_band_or_an_uncertainty_that_is_far_off_is_told():
     outcome = study(REDUCED[0])
     limits = outcome.case.limits
 
-    def told(scale: float, shift: float = 0.0) -> set[str]:
+    def told(scale, shift=0.0):
         z = {band: z / scale + shift for band, z in outcome.z.items()}
         error = outcome.error + shift * outcome.u
         return {*replace(outcome, error=error, u=scale * outcome.u, z=z).exceeded(limits)}

@@ -3,7 +3,7 @@
 Set MEMSCAL_FULL_STUDY for 20 seeds at 0.1 and 0.5 % of noise in place of one at 0.1 %.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import replace
 
 import pytest
@@ -27,16 +27,16 @@ NAMED = 0.9
 Scans = Callable[..., memscal.Scan]
 
 
-def of(**other: object) -> Scans:
+def of(**other):
     """Scans of a world that is perturbed in one way."""
     world = replace(ROUND, **other)
     return lambda seed, **noise: perturbed_scan(world, seed, **noise)
 
 
-def of_film(law: str, stated: str) -> Scans:
+def of_film(law, stated):
     """Scans at 1 N of a film of one law that states another, or none."""
 
-    def scan(seed: int, *, noise: float, noise_stated: bool) -> memscal.Scan:
+    def scan(seed, *, noise, noise_stated):
         made = direct_scan(GAUSSIAN, law=law, noise=noise, seed=seed)
         errors = made.u_zz_errors if noise_stated else None
         return replace(made, film=replace(FILM, law=stated), u_zz_errors=errors)
@@ -57,7 +57,7 @@ CAUSES = {
 PASSING = ("baseline_curvature",)
 
 
-def parts(weight: float, core: float, wide: float) -> Scans:
+def parts(weight, core, wide):
     """Scans by a G of a core and tails, of widths in m."""
     return of(parts=(Part(weight, (core, core)), Part(1 - weight, (wide, wide))))
 
@@ -75,7 +75,7 @@ UNLISTED = {
 }
 
 
-def failing(scans: Iterable[Scans]) -> list[memscal.Calibration]:
+def failing(scans):
     """Calibrations in which a check fails, of noise that is stated and that is not."""
     found = []
     for made in scans:
@@ -89,7 +89,7 @@ def failing(scans: Iterable[Scans]) -> list[memscal.Calibration]:
     return found
 
 
-def named(result: memscal.Calibration) -> list[str]:
+def named(result):
     """Names of what explains a scan, the best first."""
     return [row["name"] for row in result.to_dict()["explanations"] if row["named"]]
 

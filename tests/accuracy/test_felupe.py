@@ -6,13 +6,11 @@ modulus is 5000 times the shear modulus.  All meshes are twice finer if MEMSCAL_
 """
 
 import math
-from typing import Any
 
 import numpy as np
 import pytest
 from helpers.bounds import FULL
 from helpers.paper import FILM, ROD
-from numpy.typing import NDArray
 from scipy.special import j0
 
 from memscal import indent
@@ -30,13 +28,13 @@ WAVENUMBERS = np.linspace(0.0, 3.0, 13)  # rad/mm
 REFINEMENT = 1.0 if FULL else 0.5
 
 
-def graded(length: float, first: float, widest: float) -> NDArray[np.float64]:
+def graded(length, first, widest):
     x = np.cumsum(np.minimum(first * 1.4 ** np.arange(99), widest))
     count = np.searchsorted(x, length) + 1
     return x[:count] * (length / x[count - 1])
 
 
-def film_of_quadrilaterals(start: float, end: float, side: float) -> Any:
+def film_of_quadrilaterals(start, end, side):
     """Return a mesh in FElupe's coordinates (height, radius), even from start to end; the rod."""
     wide = 0.2 / math.sqrt(REFINEMENT)
     even = np.linspace(start, end, round((end - start) / side) + 1)
@@ -51,7 +49,7 @@ def film_of_quadrilaterals(start: float, end: float, side: float) -> Any:
 class RodContact(felupe.mechanics.ContactRigidBase):
     """FElupe's contact of nodes with a rigid body, in the shape of a rod."""
 
-    def _kinematics(self, dx: NDArray[np.float64]) -> tuple[Any, Any, Any]:
+    def _kinematics(self, dx):
         """Return distances outside the rod, normals of its surface and their derivatives."""
         p = np.stack([EDGE - dx[:, 0], dx[:, 1] - (A - EDGE)], axis=-1)  # from the edge's centre
         turning = np.all(p > 0, axis=1)[:, None]
@@ -63,7 +61,7 @@ class RodContact(felupe.mechanics.ContactRigidBase):
         return gap, normal, bend * (turning / away)[:, :, None]
 
 
-def press_with_felupe(loads: tuple[float, ...], friction: float, mesh: Any) -> list[Any]:
+def press_with_felupe(loads, friction, mesh):
     """Return depths (mm) and spectra of the base's reactions (N)."""
     region = felupe.RegionBiQuadraticQuad(mesh)
     inside = {"quadrature": region.quadrature, "grad": False}

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from helpers.direct import LOADS, RATIO, Kernel, direct_scan
+from helpers.direct import LOADS, RATIO, direct_scan
 from helpers.scans import GAUSSIAN, TAILS
 from scipy.stats import binom, chi2, norm
 
@@ -22,21 +22,21 @@ SEEDS = 200
 CHANCE = 1e-5
 LINEAR, RUBBER, MOONEY = LAWS
 DISC = memscal.SmoothedDisc(radius=0.9e-3, sigma=0.25e-3)
-SENSORS: dict[str, Kernel] = {"Gaussian": GAUSSIAN, "disc": DISC, "tails": TAILS}
+SENSORS = {"Gaussian": GAUSSIAN, "disc": DISC, "tails": TAILS}
 BALANCE = 0.01
 """Relative standard uncertainty of each load: scans are off by such an error each."""
 
 
 def scans_of(
-    law: str,
-    sensor: str,
-    seed: int,
+    law,
+    sensor,
+    seed,
     *,
-    noise: float = 0.005,
+    noise=0.005,
     loads=LOADS,
     radii=(0.25e-3,),
-    film: memscal.ElasticFilm = PAPER_FILM,
-) -> list[memscal.Scan]:
+    film=PAPER_FILM,
+):
     scans = []
     for i, (load, radius) in enumerate((load, radius) for load in loads for radius in radii):
         rng = np.random.default_rng([seed, i])

@@ -5,7 +5,6 @@ film, radii.  Set MEMSCAL_FULL_STUDY for 60 experiments a case in place of 2.
 """
 
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 import pytest
@@ -25,7 +24,7 @@ CAREFUL = {"repeats": 3, "load_uncertainty": 0.003}
 
 
 @lru_cache
-def study(**mistake: Any) -> list[tuple[float, float, int, float]]:
+def study(**mistake):
     """Force over load, its uncertainty, failed force checks, and width of G, of each."""
     found = []
     for seed in range(EXPERIMENTS):
@@ -38,7 +37,7 @@ def study(**mistake: Any) -> list[tuple[float, float, int, float]]:
     return found
 
 
-def alarmed(**mistake: Any) -> int:
+def alarmed(**mistake):
     return sum(alarms > 0 for _, _, alarms, _ in study(**mistake))
 
 

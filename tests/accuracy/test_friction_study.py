@@ -11,7 +11,6 @@ voltages by the hundred.
 import math
 from dataclasses import dataclass
 from functools import cache, cached_property
-from typing import Any
 
 import numpy as np
 import pytest
@@ -25,7 +24,6 @@ from memscal.extensions.simulation.rod_scan import PAPER_FILM
 from memscal.friction.calculated import amontons_family
 from memscal.friction.compare import channels_of, compare_measured, fit_together
 from memscal.friction.effective import fit_friction
-from memscal.friction.family import ProfileFamily
 from memscal.friction.results import FrictionComparison
 
 pytestmark = pytest.mark.accuracy
@@ -45,11 +43,11 @@ class Outcome:
     apparatus: memscal.ApparatusFunction
 
     @property
-    def joint(self) -> Any:
+    def joint(self):
         return self.comparison.joint["dry"]["incremental"]
 
     @cached_property
-    def apart(self) -> Any:
+    def apart(self):
         """The same with the lubricated loads by themselves."""
         measured = self.comparison.measured
         channels = channels_of(measured, self.apparatus, families())
@@ -57,25 +55,25 @@ class Outcome:
         return fit_together(measured, fits)["dry"]["incremental"]
 
     @property
-    def readings(self) -> list[Any]:
+    def readings(self):
         """Intervals of single dry loads, by both readings."""
         loads = [c for c in self.comparison.loads["incremental"] if c.lubrication == "dry"]
         return [reading for c in loads for reading in (c.by_profile, c.by_maximum)]
 
-    def failed(self) -> set[str]:
+    def failed(self):
         """Names of the checks that failed, without their numbers."""
         names = {check.name for check in self.comparison.checks if not check.passed}
         return {name.rstrip("0123456789").rstrip("_") for name in names}
 
 
 @cache
-def families() -> dict[str, ProfileFamily]:
+def families():
     """Contacts of the paper's sphere at the paper's loads: the same for every experiment."""
     return {"incremental": amontons_family(PAPER_FILM, PAPER_SPHERE, PAPER_LOADS, reach=24e-3)}
 
 
 @cache
-def outcome(friction: float, seed: int, gain: float = 1.0, thickness: float = 1.0) -> Outcome:
+def outcome(friction, seed, gain=1.0, thickness=1.0):
     """Make, calibrate, measure and compare one experiment, all inputs drawn."""
     mistakes = {"gain": gain, "thickness_factor": thickness}
     # Every coefficient has seeds of its own: shared ones would be unlucky together.
@@ -88,7 +86,7 @@ def outcome(friction: float, seed: int, gain: float = 1.0, thickness: float = 1.
     return Outcome(friction, compare_measured(measured, apparatus, families(), **held), apparatus)
 
 
-def outcomes(*frictions: float, **mistakes: float) -> list[Outcome]:
+def outcomes(*frictions, **mistakes):
     return [
         outcome(mu, seed, **mistakes)
         for mu in frictions
@@ -96,7 +94,7 @@ def outcomes(*frictions: float, **mistakes: float) -> list[Outcome]:
     ]
 
 
-def at_least(count: int, of: int, share: float) -> bool:
+def at_least(count, of, share):
     """Whether a count is not too small for a share, but for chance."""
     return count >= binom.ppf(CHANCE, of, share)
 
@@ -174,7 +172,7 @@ def test_chi_square_is_as_large_as_its_degrees_say():
 
 
 def test_dry_and_lubricated_differ_where_there_is_friction_only():
-    def apart(friction: float) -> list[bool]:
+    def apart(friction):
         pairs = [one.comparison.dry_against_lubricated for one in outcomes(friction)]
         return [pair.p_value < 0.05 for both in pairs for pair in both]
 
@@ -198,7 +196,7 @@ def test_checks_of_friction_pass_where_nothing_is_wrong():
 def test_a_mistake_that_sensor_and_film_share_cancels_beside_lubricated_loads():
     seeds = range(min(SEEDS, 16))
 
-    def shifts(**mistakes: float) -> tuple[float, float]:
+    def shifts(**mistakes):
         """Median change of the coefficient, dry loads apart, and beside the lubricated ones."""
         pairs = [(outcome(0.1, seed, **mistakes), outcome(0.1, seed)) for seed in seeds]
         apart = np.median([wrong.apart.best - clean.apart.best for wrong, clean in pairs])

@@ -12,7 +12,6 @@ import shutil
 import subprocess
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -34,7 +33,7 @@ pytestmark = pytest.mark.accuracy
 
 
 @pytest.fixture(scope="module", autouse=True)
-def python() -> str:
+def python():
     """The Python that GetFEM belongs to."""
     found = shutil.which("python3", path="/usr/bin")
     probe = [found or "", "-c", "import getfem"]
@@ -44,7 +43,7 @@ def python() -> str:
 
 
 @lru_cache
-def by_getfem(python: str, friction: float, steps: int, step: float = STEP) -> list[dict[str, Any]]:
+def by_getfem(python, friction, steps, step=STEP):
     """States of the paper's sphere and film at the paper's loads, in mm, N and MPa."""
     case = {
         "young_modulus": 2.2,
@@ -75,18 +74,18 @@ def by_getfem(python: str, friction: float, steps: int, step: float = STEP) -> l
 
 
 @lru_cache
-def by_memscal(friction: float) -> list[memscal.Contact]:
+def by_memscal(friction):
     return memscal.indent(FILM, SPHERE, load=LOADS, friction=friction, loading="incremental")
 
 
-def edge(state: dict[str, Any]) -> float:
+def edge(state):
     """Contact radius in mm."""
     r = state["r"]
     pressure = state["pressure"]
     return contact_radius(r, load_beyond(r, pressure), r[pressure > 0.02 * pressure.max()].max())
 
 
-def differences(contact: memscal.Contact, state: dict[str, Any]) -> dict[str, float]:
+def differences(contact, state):
     """Depth and contact radius relative to memscal's; stresses to the highest of their face."""
     base = contact.base_stress(state["base_r"] * 1e-3) * 1e-6
     base_shear = contact.base_shear(state["base_shear_r"] * 1e-3) * 1e-6
@@ -104,7 +103,7 @@ def differences(contact: memscal.Contact, state: dict[str, Any]) -> dict[str, fl
     }
 
 
-def in_the_limit(coarse: list[dict[str, Any]], fine: list[dict[str, Any]]) -> list[dict[str, Any]]:
+def in_the_limit(coarse, fine):
     """States for infinitely many steps, by extrapolation: the error goes with their length."""
     return [
         {name: 2 * last[name] - first[name] for name in last}
@@ -112,7 +111,7 @@ def in_the_limit(coarse: list[dict[str, Any]], fine: list[dict[str, Any]]) -> li
     ]
 
 
-def worst(friction: float, states: list[dict[str, Any]]) -> dict[str, float]:
+def worst(friction, states):
     """The largest differences over all loads."""
     each = [differences(*pair) for pair in zip(by_memscal(friction), states, strict=True)]
     return {name: max(one[name] for one in each) for name in each[0]}

@@ -11,14 +11,12 @@ import numpy as np
 import pytest
 from accuracy.test_division import CASES as SENSORS
 from helpers.bounds import FULL
-from helpers.estimation_study import Case
 from scipy.stats import chi2
 
 import memscal
 from memscal.calibration.calibrate import uncertainties
 from memscal.calibration.stages import solve
 from memscal.deconvolution.division import WhiteNoise
-from memscal.model.arrays import FloatArray
 
 pytestmark = pytest.mark.accuracy
 
@@ -30,7 +28,7 @@ ROUTES = ("division", "bayesian")
 SPLITS = [*((case, "points") for case in SENSORS), (SENSORS[4], "repeats")]
 
 
-def estimates(scan: memscal.Scan) -> FloatArray:
+def estimates(scan):
     """By division and by model averaging: NUMBERS and G at RADII, and the noise of each."""
     contact = memscal.indent(scan.film, scan.indenter, load=scan.load)
     solution = solve([scan], [contact], WhiteNoise())
@@ -47,7 +45,7 @@ def estimates(scan: memscal.Scan) -> FloatArray:
 
 
 @lru_cache
-def deviates(case: Case, split: str) -> FloatArray:
+def deviates(case, split):
     """Differences between halves over their predicted deviation: (scans, routes, numbers)."""
     rows = []
     for seed in range(1000, 1000 + 2 * SCANS, 2):
@@ -64,9 +62,7 @@ def deviates(case: Case, split: str) -> FloatArray:
     return np.array(rows)
 
 
-def require_unit(
-    deviates: FloatArray, route: str, of_shape: tuple[float, float] = (0.8, 1.2)
-) -> None:
+def require_unit(deviates, route, of_shape=(0.8, 1.2)):
     ratio = np.sqrt(np.mean(deviates[:, ROUTES.index(route)] ** 2, axis=0))
     count = len(deviates)
     low, high = np.sqrt(chi2.isf([1 - CHANCE, CHANCE], count) / count)

@@ -10,7 +10,6 @@ more repeats, do; those on a film that is *known* better than the paper's do wit
 import math
 from dataclasses import replace
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 import pytest
@@ -18,14 +17,12 @@ from helpers.scans import simulate_experiment
 from scipy.stats import binom
 
 import memscal
-from memscal import ElasticFilm, Interface
+from memscal import Interface
 from memscal.extensions.interface_laws.families import elasto_plastic_family
 from memscal.extensions.interface_laws.model_comparison import compare_interface
-from memscal.extensions.interface_laws.results import LawComparison
 from memscal.extensions.simulation.contact_scan import PAPER_LOADS, PAPER_SPHERE
 from memscal.extensions.simulation.rod_scan import PAPER_FILM
 from memscal.friction import calculated
-from memscal.friction.family import ProfileFamily
 
 pytestmark = [pytest.mark.accuracy, pytest.mark.full_study]
 
@@ -35,14 +32,14 @@ MACROSCOPIC = 1.6
 SLIP_LENGTH = 16e-6
 _REACH = 12e-3
 
-PRECISE: dict[str, Any] = {
+PRECISE = {
     "noise": 0.001,
     "record_loads": True,
     "load_reading": 0.002,
     "position_error": 2e-6,
     "repeats": 9,
 }
-KINDS: dict[str, dict[str, Any]] = {
+KINDS = {
     "paper": {"noise": 0.003, "repeats": 3},
     "precise": PRECISE,
     "known": {**PRECISE, "load_uncertainty": 0.003},
@@ -56,20 +53,20 @@ KNOWN_FILM = replace(
 
 
 @lru_cache
-def rigid(film: ElasticFilm) -> ProfileFamily:
+def rigid(film):
     """Contacts of the paper's sphere at the paper's loads: the same for every experiment."""
     return calculated.amontons_family(film, PAPER_SPHERE, PAPER_LOADS, reach=_REACH)
 
 
 @lru_cache
-def slipping(film: ElasticFilm) -> ProfileFamily:
+def slipping(film):
     return elasto_plastic_family(
         film, PAPER_SPHERE, PAPER_LOADS, friction=MACROSCOPIC, reach=_REACH
     )
 
 
 @lru_cache
-def weighed(friction: float, slip_length: float, kind: str, seed: int) -> LawComparison:
+def weighed(friction, slip_length, kind, seed):
     """Make, calibrate and measure one experiment, and weigh laws of its dry interface."""
     interface = Interface(slip_length=slip_length) if slip_length else None
     film = KNOWN_FILM if kind == "known" else PAPER_FILM
@@ -85,13 +82,11 @@ def weighed(friction: float, slip_length: float, kind: str, seed: int) -> LawCom
     return found
 
 
-def experiments(
-    friction: float, slip_length: float = 0.0, kind: str = "precise"
-) -> list[LawComparison]:
+def experiments(friction, slip_length=0.0, kind="precise"):
     return [weighed(friction, slip_length, kind, seed) for seed in range(SEEDS)]
 
 
-def enough(share: float) -> int:
+def enough(share):
     """Fewest successes that chance allows of a share."""
     return int(binom.ppf(CHANCE, SEEDS, share))
 

@@ -5,7 +5,6 @@ Set MEMSCAL_FULL_STUDY for 192 rasters, 75 scans with outliers and 150 of each k
 
 from dataclasses import replace
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 import pytest
@@ -16,7 +15,6 @@ from scipy.interpolate import make_interp_spline
 from scipy.stats import binom
 
 import memscal
-from memscal.model.arrays import FloatArray
 
 pytestmark = pytest.mark.accuracy
 
@@ -26,7 +24,7 @@ ERROR = 10e-6
 
 
 @lru_cache
-def clean(side: int) -> FloatArray:
+def clean(side):
     """Voltages of a raster of the round sensor."""
     x = np.linspace(-HALF, HALF, side)
     return np.stack([ROUND.voltages(x, y=float(y)) for y in x])
@@ -70,7 +68,7 @@ def test_outliers_move_a_division_by_its_uncertainty_from_the_truth_and_the_othe
 def test_errors_of_positions_are_as_stated(anew):
     fine = np.arange(-HALF - 0.2e-3, HALF + 0.2e-3, 0.02e-3)
     at = make_interp_spline(fine, ROUND.voltages(fine), k=5)
-    film: Any = {"thickness_uncertainty": None, "poisson_ratio_uncertainty": None}
+    film = {"thickness_uncertainty": None, "poisson_ratio_uncertainty": None}
     stated = scan(ROUND, 0)
     stated = replace(stated, load_uncertainty=None, film=replace(stated.film, **film))
     off = []

@@ -4,14 +4,13 @@ Set MEMSCAL_FULL_STUDY for 30 runs and 60 draws a row in place of 6 and 6.
 """
 
 import csv
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from helpers.bounds import root_mean_square_limit
-from helpers.outside import FILM, ROUND, SIGMA, A, Part, World, elliptic, line
+from helpers.outside import FILM, ROUND, SIGMA, A, Part, elliptic, line
 from helpers.outside import scan as perturbed_scan
 from helpers.outside_study import (
     ALARMED,
@@ -31,7 +30,7 @@ import memscal
 
 pytestmark = pytest.mark.accuracy
 
-PERTURBED: dict[str, Callable[[float], World]] = {
+PERTURBED = {
     "roundness": lambda size: elliptic(1 + size),
     "line_offset": lambda size: replace(ROUND, line_offset=size),
     "stage_scale": lambda size: replace(ROUND, stage_scale=1 + size),
@@ -47,7 +46,7 @@ EITHER_SIGN = ("thickness", "shear_sensitivity")
 MOST = {"thickness": 0.03e-3, "poisson_ratio": 0.02}
 
 
-def unstated(world: World, noise: float) -> memscal.Scan:
+def unstated(world, noise):
     """A scan without noise whose film and load state no uncertainty."""
     made = perturbed_scan(world, 0, noise=noise)
     film = replace(

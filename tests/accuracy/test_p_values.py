@@ -37,7 +37,7 @@ SENSORS = {
 
 
 @lru_cache
-def p_values(sensor: str, noise: float) -> dict[str, np.ndarray]:
+def p_values(sensor, noise):
     rows = []
     first = 1000 * list(SENSORS).index(sensor)
     for seed in range(first, first + SEEDS):
@@ -74,7 +74,7 @@ def test_uncertain_positions_are_noise_of_every_chi_square():
     fine = simulated(noise=0.0, points=1025)
     error = 10e-6
     voltage = make_interp_spline(fine.x, fine.u_zz, k=5)
-    found: dict[str, list[float]] = {"gaussian_misfit": [], "chi_square": [], "reconvolution": []}
+    found = {"gaussian_misfit": [], "chi_square": [], "reconvolution": []}
     for seed in range(SEEDS):
         scan = simulated(noise=0.002, seed=seed)
         off = error * np.random.default_rng([seed, 1]).normal(size=65)

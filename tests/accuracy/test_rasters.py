@@ -19,8 +19,6 @@ from scipy.signal import fftconvolve
 from skimage.restoration import wiener
 
 import memscal
-from memscal.model.arrays import FloatArray
-from memscal.model.scan import Scan
 
 pytestmark = pytest.mark.accuracy
 LOG = logging.getLogger(__name__)
@@ -32,7 +30,7 @@ METHODS = ("white-noise", "bayesian")
 
 
 @lru_cache
-def halves(seed: int, method: str) -> tuple[memscal.ApparatusFunction, ...]:
+def halves(seed, method):
     """Calibrate with the black fields of a checkerboard, and with the white ones."""
     scan = tailed_raster(seed=seed, **SIZE)
     black = np.indices(scan.u_zz.shape).sum(axis=0) % 2 == 0
@@ -40,14 +38,14 @@ def halves(seed: int, method: str) -> tuple[memscal.ApparatusFunction, ...]:
     return tuple(memscal.calibrate(part, method=method).apparatus for part in parts)
 
 
-def on_plane(apparatus: memscal.ApparatusFunction, name: str) -> FloatArray:
+def on_plane(apparatus, name):
     """A field of an apparatus function out to two widths from its centre, (p,)."""
     field = apparatus.field
     spline = RectBivariateSpline(field.y, field.x, getattr(field, name))
     return np.asarray(spline(AXIS, AXIS)[INSIDE])
 
 
-def true_g(apparatus: memscal.ApparatusFunction) -> FloatArray:
+def true_g(apparatus):
     """G at the same places."""
     p = apparatus.parameters
     x = AXIS + p["centre"] - CENTRE[0]
@@ -55,7 +53,7 @@ def true_g(apparatus: memscal.ApparatusFunction) -> FloatArray:
     return np.asarray(TailedEllipse().at(x[None, :], y[:, None])[INSIDE])
 
 
-def rms(values: FloatArray) -> float:
+def rms(values):
     return float(np.sqrt(np.mean(values**2)))
 
 
@@ -99,7 +97,7 @@ def test_halves_of_a_raster_differ_as_their_uncertainty_says(method):
 
 
 def test_held_out_points_are_predicted_as_well_as_by_a_tuned_wiener_filter():
-    ratios: dict[str, list[float]] = {method: [] for method in METHODS}
+    ratios = {method: [] for method in METHODS}
     for seed in range(SEEDS):
         scan = tailed_raster(seed=seed, **SIZE)
         held = np.random.default_rng(1000 + seed).random(scan.u_zz.shape) < 0.2
@@ -111,7 +109,7 @@ def test_held_out_points_are_predicted_as_well_as_by_a_tuned_wiener_filter():
     assert max(float(np.mean(ratio)) for ratio in ratios.values()) < 1.1
 
 
-def predicted(train: Scan, method: str) -> FloatArray:
+def predicted(train, method):
     """Voltages at all nodes by the field of G, without baseline."""
     calibration = memscal.calibrate(train, method=method)
     p = calibration.apparatus.parameters
@@ -124,13 +122,13 @@ def predicted(train: Scan, method: str) -> FloatArray:
     return np.asarray(volts[beyond:-beyond, beyond:-beyond])
 
 
-def stress_about(scan: Scan, x: FloatArray, y: FloatArray) -> FloatArray:
+def stress_about(scan, x, y):
     contact = memscal.indent(scan.film, scan.indenter, load=scan.load)
     r = np.hypot.outer(y, x)
     return contact.base_stress(r.ravel()).reshape(r.shape)
 
 
-def best_wiener(scan: Scan, held: FloatArray) -> float:
+def best_wiener(scan, held):
     """Least error at the points held out, the balance chosen for that."""
     x, y = scan.positions
     places = np.stack([x[~held], y[~held]], axis=1)
@@ -150,7 +148,7 @@ def best_wiener(scan: Scan, held: FloatArray) -> float:
     return min(residual(scan, held, v) for v in volts)
 
 
-def residual(scan: Scan, held: FloatArray, volts: FloatArray) -> float:
+def residual(scan, held, volts):
     """RMS error at the points held out; baseline and drift are fitted to the others."""
     x, y = scan.positions
     plane = np.stack([np.ones_like(x), x, y], axis=-1)

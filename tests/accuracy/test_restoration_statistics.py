@@ -32,7 +32,7 @@ SMALL, MIDDLE, LARGE = (memscal.Sphere(radius=radius) for radius in (50e-3, 80e-
 FLAT, STEEP = (memscal.Cone(inclination=angle) for angle in (0.035, 0.07))
 
 
-def at_once(load: float, indenter: memscal.Sphere = made.SPHERE) -> memscal.Contact:
+def at_once(load, indenter=made.SPHERE):
     """Press in one step, so that all of the contact sticks."""
     return memscal.indent(made.EXACT_FILM, indenter, load=load, friction=np.inf, loading="total")
 
@@ -85,7 +85,7 @@ CASES = {
 
 
 @lru_cache
-def study(case: str, noise: float) -> np.ndarray:
+def study(case, noise):
     """Of each seed: share of radii within 95 % bounds, error, stated error, z of the force."""
     # Every case and noise has draws of its own: shared ones would be unlucky together.
     press, kernel = CASES[case]
@@ -93,16 +93,14 @@ def study(case: str, noise: float) -> np.ndarray:
     return drawn(press(), kernel, noise, place)
 
 
-def drawn(
-    contact: memscal.Contact, kernel: memscal.RadialKernel, noise: float, place: int
-) -> np.ndarray:
+def drawn(contact, kernel, noise, place):
     sensor = replace(made.known_apparatus(kernel), film=contact.film)
     seeds = range(1000 * place, 1000 * place + SEEDS)
     scans = (made.sphere_scan(contact, kernel=kernel, noise=noise, seed=s) for s in seeds)
     return np.array([outcome(memscal.restore(scan, sensor), contact) for scan in scans])
 
 
-def outcome(found: memscal.Restoration, contact: memscal.Contact) -> tuple[float, ...]:
+def outcome(found, contact):
     r = found.r[found.r <= REACH]
     stress = found.stress(r)
     errors = found.stress_uncertainty(r)
@@ -113,7 +111,7 @@ def outcome(found: memscal.Restoration, contact: memscal.Contact) -> tuple[float
     return float(within), plane_error(r, stress, truth), stated, z
 
 
-def everything() -> np.ndarray:
+def everything():
     return np.concatenate([study(case, noise) for case in CASES for noise in NOISES])
 
 
@@ -131,7 +129,7 @@ def test_departures_are_as_strong_as_was_chosen_on_other_contacts(
     # within chance: docs/restoration.md.
     cases = [(press(), kernel, n) for press, kernel in CHOSEN_ON.values() for n in NOISES]
 
-    def within() -> np.ndarray:
+    def within():
         return np.concatenate([drawn(*case, 500 + i)[:, 0] for i, case in enumerate(cases)])
 
     chosen = within()

@@ -8,12 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from helpers.bounds import FULL, root_mean_square_limit
-from helpers.outside import FILM, ROUND, A, Noise, correlated, line, scan
+from helpers.outside import FILM, ROUND, A, correlated, line, scan
 from helpers.outside_study import TRUTHS, deviates
 from helpers.scans import calibrated
 
-from memscal.calibration.calibrate import Calibration, uncertainties
-from memscal.model.arrays import FloatArray
+from memscal.calibration.calibrate import uncertainties
 
 pytestmark = pytest.mark.accuracy
 
@@ -22,7 +21,7 @@ COUNT = 100 if FULL else 12
 CHANCE = 1e-3
 
 
-def true_voltages(rng: np.random.Generator, step: float) -> FloatArray:
+def true_voltages(rng, step):
     """Voltages (n,) of a film and load that are drawn from what is stated."""
     # Of few Poisson's ratios, for each of which the film is solved.
     ratio = 0.5 - round(abs(rng.normal(0.0, 0.005)), 3)
@@ -31,7 +30,7 @@ def true_voltages(rng: np.random.Generator, step: float) -> FloatArray:
     return replace(world, load_scale=rng.normal(1.0, 0.01)).voltages(line(step=step))
 
 
-def calibration_of(seed: int, noise: Noise, step: float = 0.25e-3) -> Calibration:
+def calibration_of(seed, noise, step=0.25e-3):
     """Calibrate a scan whose noise is not stated, in shares of its largest signal."""
     rng = np.random.default_rng([seed, 35])
     u = true_voltages(rng, step)
@@ -42,7 +41,7 @@ def calibration_of(seed: int, noise: Noise, step: float = 0.25e-3) -> Calibratio
 WHITE = correlated(0.0, 0.0, 0.005)
 
 
-def errors(calibration: Calibration) -> dict[str, float]:
+def errors(calibration):
     """Errors of A by both routes and of sigma over their stated uncertainties."""
     apparatus = calibration.apparatus
     found = dict(zip(TRUTHS, deviates(apparatus.parameters), strict=True))

@@ -8,7 +8,7 @@ import pytest
 from helpers.bounds import FULL, root_mean_square_limit
 from helpers.outside import FILM, elliptic, tail
 from helpers.outside_sphere import SPHERE
-from helpers.two_states import MEAN_RATIO, STATES, Outcome, drawn, outcome, perturbed
+from helpers.two_states import MEAN_RATIO, STATES, drawn, outcome, perturbed
 from scipy.stats import binom, chi2
 
 pytestmark = pytest.mark.accuracy
@@ -18,7 +18,7 @@ FEW = 10 if FULL else 1
 CHANCE = 1e-3
 
 
-def root_mean_square(outcomes: list[Outcome]) -> float:
+def root_mean_square(outcomes):
     return float(np.sqrt(np.mean([one.deviation**2 for one in outcomes])))
 
 

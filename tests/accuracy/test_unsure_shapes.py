@@ -15,8 +15,7 @@ from helpers.outside import Part, World
 from scipy.stats import chi2
 
 import memscal
-from memscal import ApparatusFunction, ElasticFilm, Rod, Scan
-from memscal.model.arrays import FloatArray
+from memscal import ElasticFilm, Rod, Scan
 
 pytestmark = pytest.mark.accuracy
 
@@ -33,23 +32,23 @@ FILM = ElasticFilm(young_modulus=0.5e6, poisson_ratio=0.5, thickness=2.5e-3, law
 PLACES = (np.arange(20) - 9.37) * 1e-3
 
 
-def calibrated(scan: Scan, **given: str) -> ApparatusFunction:
+def calibrated(scan, **given):
     return memscal.calibrate(scan, method="bayesian", other=False, **given).apparatus
 
 
-def halves(scan: Scan) -> list[Scan]:
+def halves(scan):
     """Return every other place of a scan, and the others."""
     names = ("x", "u_zz", "u_zz_errors")
     return [replace(scan, **{n: getattr(scan, n)[i::2] for n in names}) for i in (0, 1)]
 
 
-def few_places(kind: str, seed: int) -> Scan:
+def few_places(kind, seed):
     world = World(load=1.0, radius=0.5e-3, thickness=2.5e-3, parts=SENSORS[kind])
     made = outside.scan(world, seed, noise=0.002, x=PLACES)
     return replace(made, load_uncertainty=None, indenter=Rod(radius=0.5e-3), film=FILM)
 
 
-def flat_top(seed: int, decay: float) -> tuple[Scan, float]:
+def flat_top(seed, decay):
     """Return a box of 24 mm whose tails decay over so many mm, and its integral over the slit."""
     x = np.arange(71) - 34.8
     fine = np.arange(-400, 400, 0.05)
@@ -61,7 +60,7 @@ def flat_top(seed: int, decay: float) -> tuple[Scan, float]:
     return scan, (24 + 2 * decay) / 2.5e3
 
 
-def parts(found: ApparatusFunction, *sources: str) -> FloatArray:
+def parts(found, *sources):
     return np.array([np.hypot(*(found.budget[name][s] for s in sources)) for name in NUMBERS])
 
 

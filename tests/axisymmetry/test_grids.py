@@ -9,16 +9,15 @@ from memscal.axisymmetry.grids import EvenGrid, Lattice, on_grid
 from memscal.axisymmetry.hankel import radial_spline
 from memscal.axisymmetry.kernels import unit_gaussian
 from memscal.errors import InputError
-from memscal.model.arrays import FloatArray
 
 SEEDS = st.integers(0, 2**32 - 1)
 
 
-def centred_axis(count: int, step: float, offset: float = 0.0) -> FloatArray:
+def centred_axis(count, step, offset=0.0):
     return (np.arange(count) - count // 2) * step + offset
 
 
-def random_field(seed: int) -> tuple[Lattice, FloatArray]:
+def random_field(seed):
     """A lattice of a random size, step and place, and a field on it."""
     rng = np.random.default_rng(seed)
     axes = [
@@ -109,7 +108,7 @@ def test_lifting_then_cutting_gives_the_profile_back(seed):
     weights = rng.normal(size=4)
     widths = rng.uniform(0.6, 2.0, size=4)
 
-    def profile(r: FloatArray) -> FloatArray:
+    def profile(r):
         return np.exp(-((r[..., None] / widths) ** 2) / 2) @ weights
 
     r = rng.uniform(0.0, 6.4, size=200)

@@ -15,12 +15,11 @@ from memscal.axisymmetry.hankel import (
     radial_spline,
 )
 from memscal.axisymmetry.kernels import unit_gaussian
-from memscal.model.arrays import FloatArray
 
 K = np.linspace(0.05, 20.0, 60)
 
 
-def gaussian(r: FloatArray) -> FloatArray:
+def gaussian(r):
     return unit_gaussian(r, 1.0)
 
 

@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 from memscal import GaussianMixture, SmoothedDisc
 from memscal.axisymmetry.hankel import hankel_transform
 from memscal.errors import InputError
-from memscal.model.arrays import FloatArray
 
 
 @given(shares=st.lists(st.floats(-2, 2), min_size=0, max_size=3), data=st.data())
@@ -38,7 +37,7 @@ def test_a_mixture_that_is_no_apparatus_function_is_refused(weights, sigmas, pro
         GaussianMixture(weights, sigmas)
 
 
-def blurred_disc(radius: float, sigma: float, r: FloatArray) -> FloatArray:
+def blurred_disc(radius, sigma, r):
     """Add up the Gaussians of every point of a disc: Gauss' rule outward, even angles around."""
     nodes, weights = np.polynomial.legendre.leggauss(200)
     q = 0.5 * radius * (nodes + 1)

@@ -7,9 +7,7 @@ from helpers.scans import LINEAR_FILM, simulate
 from scipy.optimize import curve_fit
 
 import memscal
-from memscal import Scan, StressProfile
 from memscal.axisymmetry.kernels import unit_gaussian
-from memscal.model.arrays import FloatArray
 
 pytestmark = pytest.mark.benchmark
 
@@ -17,16 +15,16 @@ WIDTH = 16e-3
 
 
 @pytest.fixture(scope="module")
-def scan() -> Scan:
+def scan():
     return simulate(film=LINEAR_FILM, points=65, noise=0.002, centre=(0.0, 0.0), drift=0.0, seed=4)
 
 
 @pytest.fixture(scope="module")
-def reference(scan: Scan) -> StressProfile:
+def reference(scan):
     return memscal.indent(scan.film, scan.indenter, load=scan.load).profile()
 
 
-def plain_pipeline(scan: Scan, reference: StressProfile) -> FloatArray:
+def plain_pipeline(scan, reference):
     """The paper's steps as plainly as they can be written: lift, add noise, divide, fit."""
     pixels = 512
     rng = np.random.default_rng(0)
@@ -43,7 +41,7 @@ def plain_pipeline(scan: Scan, reference: StressProfile) -> FloatArray:
     g = np.fft.fftshift(np.fft.ifft2(np.fft.fft2(u) / np.fft.fft2(sigma)).real) / pixel**2
     rows = slice(pixels // 2 - 100, pixels // 2 + 101)
 
-    def bell(distance: FloatArray, constant: float, width: float) -> FloatArray:
+    def bell(distance, constant, width):
         return constant * unit_gaussian(distance, width)
 
     fit, _ = curve_fit(bell, r[rows, rows].ravel(), g[rows, rows].ravel(), p0=(1e-7, 0.5e-3))

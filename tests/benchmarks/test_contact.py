@@ -9,13 +9,12 @@ from scipy.optimize import nnls
 from memscal import Interface
 from memscal.mechanics.film_response import HankelFilm
 from memscal.mechanics.solver.path import follow
-from memscal.mechanics.solver.step import ContactProblem, ContactState, Depth, Load
-from memscal.model.arrays import FloatArray
+from memscal.mechanics.solver.step import ContactProblem, Depth, Load
 
 pytestmark = pytest.mark.benchmark
 
 
-def contact_of_200_rings(friction: float) -> ContactProblem:
+def contact_of_200_rings(friction):
     """The paper's sphere: 200 rings up to the contact radius at 2.75 N, and a few beyond."""
     rings = np.linspace(0.0, 3.6e-3, 210)
     compliance = HankelFilm(FILM, rings).compliance
@@ -23,16 +22,16 @@ def contact_of_200_rings(friction: float) -> ContactProblem:
 
 
 @pytest.fixture(scope="module")
-def smooth() -> ContactProblem:
+def smooth():
     return contact_of_200_rings(0.0)
 
 
-def contact(problem: ContactProblem) -> ContactState:
+def contact(problem):
     """The contact at 2.75 N."""
     return follow(problem, [Load(2.75)], "incremental", 1)[0].state
 
 
-def plain_contact(problem: ContactProblem, depth: float) -> FloatArray:
+def plain_contact(problem, depth):
     """The same contact at a given depth as non-negative least squares, a library's way."""
     pressing = problem.heights < depth
     matrix = problem.compliance.normal[np.ix_(pressing, pressing)]
@@ -52,7 +51,7 @@ def test_a_contact_costs_a_few_dense_solutions_and_less_than_least_squares(smoot
     at_depth = follow(smooth, [Depth(depth)], "incremental", 1)[0].state
     assert at_depth.load == pytest.approx(2.75, rel=1e-9)
 
-    def dense() -> object:
+    def dense():
         return np.linalg.solve(smooth.compliance.normal, right)
 
     ratio = turns(lambda: contact(smooth), dense, 15)
@@ -72,7 +71,7 @@ def test_friction_along_a_path_costs_a_few_solutions_per_ring():
         problem.heights.size
     ]  # no shear on the axis
 
-    def path() -> object:
+    def path():
         return follow(problem, [Load(load) for load in LOADS], "incremental", 1)
 
     # 200 steps, most of them on a part of the rings.

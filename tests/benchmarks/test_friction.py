@@ -2,12 +2,10 @@
 
 import math
 import sys
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from statistics import median
 from time import process_time
-from typing import Any
 
 import pytest
 from helpers.machine import once, show
@@ -15,7 +13,6 @@ from helpers.paper import FILM, SPHERE
 
 import memscal
 from memscal.friction.calculated import amontons_family
-from memscal.friction.family import ProfileFamily
 from memscal.mechanics.solver import refinement
 from memscal.mechanics.solver.refinement import solve_on_rings
 
@@ -24,7 +21,7 @@ pytestmark = pytest.mark.benchmark
 UNCERTAIN = replace(FILM, thickness_uncertainty=2e-5)
 
 
-def family(cache: Path | None) -> ProfileFamily:
+def family(cache):
     solve_on_rings.cache_clear()
     return amontons_family(
         UNCERTAIN, SPHERE, [0.34, 2.75], friction=[0.0, 0.3], reach=12e-3, cache=cache
@@ -49,7 +46,7 @@ def test_measured_stress_and_comparison_cost_so_many_calibrations(tmp_path):
     apparatus = memscal.calibrate(experiment / "rod_scan.h5").apparatus
     friction = (0, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.6, math.inf)
 
-    def cost(work: Callable[[], Any], rounds: int, *, forget: bool) -> float:
+    def cost(work, rounds, *, forget):
         times = []
         for _ in range(rounds):
             if forget:
@@ -60,10 +57,10 @@ def test_measured_stress_and_comparison_cost_so_many_calibrations(tmp_path):
             times.append(process_time() - start)
         return median(times)
 
-    def measure() -> Any:
+    def measure():
         return memscal.measure_stress(contacts, apparatus)
 
-    def compare(cache: Path | None = None) -> Any:
+    def compare(cache=None):
         return memscal.compare(contacts, apparatus, friction=friction, cache=cache)
 
     compared = [compare(tmp_path), compare(tmp_path)]

@@ -9,7 +9,6 @@ Set MEMSCAL_FULL_STUDY for 40 seeds in place of 12, of discs drawn at random 100
 """
 
 import logging
-from collections.abc import Callable
 from functools import lru_cache
 from importlib.util import find_spec
 from time import perf_counter
@@ -17,14 +16,11 @@ from time import perf_counter
 import numpy as np
 import pytest
 from helpers.bounds import FULL
-from helpers.direct import Kernel
 from helpers.estimation_study import CASES as STUDIED
 from helpers.peers import PEERS, RADII
 from helpers.scans import plane_error
 
 import memscal
-from memscal.model.arrays import FloatArray
-from memscal.model.scan import Scan
 
 pytestmark = pytest.mark.benchmark
 LOG = logging.getLogger(__name__)
@@ -44,17 +40,17 @@ NAMES = [
 """Gaussians of three widths at three noises, and one sensor of each other kind."""
 
 
-def ours(scan: Scan, truth: Kernel) -> FloatArray:
+def ours(scan, truth):
     return memscal.calibrate(scan, method="bayesian").apparatus.radial(RADII)
 
 
 @lru_cache
-def study(name: str) -> dict[str, tuple[float, float]]:
+def study(name):
     """Median error and time of ours and every installed peer on a case's scans, taking turns."""
     case = STUDIED[name]
-    runners: dict[str, Callable[[Scan, Kernel], FloatArray]] = {OURS: ours}
+    runners = {OURS: ours}
     runners |= {peer: PEERS[peer] for peer in INSTALLED}
-    rows: dict[str, list[tuple[float, float]]] = {runner: [] for runner in runners}
+    rows = {runner: [] for runner in runners}
     for seed in (0, *range(SEEDS.get(case.kind, 40 if FULL else 12))):
         scan = case.scan(seed)
         kernel = case.drawn(seed)[0]

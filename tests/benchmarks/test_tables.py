@@ -1,7 +1,5 @@
 """Speed of importing tables: by their rows, and beside numpy's reader."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from helpers.machine import show, turns
@@ -12,7 +10,7 @@ from memscal.formats.tables.scan import import_table
 pytestmark = pytest.mark.benchmark
 
 
-def table(folder: Path, rows: int) -> Path:
+def table(folder, rows):
     x = np.linspace(-8.0, 8.0, rows)
     path = folder / f"{rows}.csv"
     head = "x/mm,u/mV,pass"
@@ -21,7 +19,7 @@ def table(folder: Path, rows: int) -> Path:
     return path
 
 
-def work(path: Path) -> None:
+def work(path):
     """Import a table, write the scan and read it again."""
     scan = import_table(path, x="x", u="u", repeat="pass")
     write_scan(scan, path.with_suffix(".h5"), overwrite=True)

@@ -24,12 +24,12 @@ SIZES = {
 }
 
 
-def stated(**sizes: float) -> memscal.Scan:
+def stated(**sizes):
     uncertainties = {f"{name}_uncertainty": size for name, size in sizes.items()}
     return replace(outside_scan(ROUND, 1), **uncertainties)
 
 
-def text_of(apparatus: memscal.ApparatusFunction) -> str:
+def text_of(apparatus):
     return " ".join(message.text for message in apparatus.process.messages)
 
 
@@ -193,7 +193,7 @@ def test_options_of_import_state_them(run, tmp_path):
     }
 
 
-def crossed(world: World, *, offset: float = 0.0, seed: int = 1) -> list[memscal.Scan]:
+def crossed(world, *, offset=0.0, seed=1):
     """Lines along x at y = 0 and along y at x = 0 of a sensor at (offset, offset)."""
     passing = replace(world, line_offset=-offset)
     lines = []

@@ -11,10 +11,9 @@ from scipy.special import erf
 
 import memscal
 from memscal import Scan
-from memscal.model.checks import QualityCheck
 
 
-def saturation(scan: Scan, **options: str) -> tuple[memscal.Calibration, QualityCheck]:
+def saturation(scan, **options):
     found = memscal.calibrate(scan, other=False, **options)
     return found, next(check for check in found.apparatus.checks if check.name == "saturation")
 

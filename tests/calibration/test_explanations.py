@@ -13,7 +13,7 @@ from memscal.calibration.explanations import DEPARTURE, explanation
 
 
 @pytest.fixture(scope="module")
-def wrong() -> memscal.Calibration:
+def wrong():
     """A calibration of a film that is thicker by a tenth than it states."""
     film = replace(LINEAR_FILM, thickness=1.1 * LINEAR_FILM.thickness)
     made = simulated(film=film, load=0.05, noise=0.001, seed=2)
@@ -62,7 +62,7 @@ def test_nothing_is_weighed_where_the_checks_pass():
     assert "suffices" in good.answer()
 
 
-def row(name: str, named: bool = True) -> dict:
+def row(name, named=True):
     return {"name": name, "words": f"a {name}", "named": named}
 
 

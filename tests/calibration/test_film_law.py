@@ -8,24 +8,22 @@ import pytest
 from helpers.scans import EXACT_FILM, LINEAR_FILM, simulated
 
 import memscal
-from memscal import Calibration
 from memscal.errors import ConvergenceError, InputError
 from memscal.mechanics import press_rod
-from memscal.model.scan import Scan
 
 LAWLESS = replace(EXACT_FILM, law="")
 
 
-def message(calibration: Calibration, kind: str) -> str:
+def message(calibration, kind):
     return next(m.text for m in calibration.apparatus.process.messages if m.kind == kind)
 
 
-def check(calibration: Calibration, name: str):
+def check(calibration, name):
     return next(c for c in calibration.apparatus.checks if c.name == name)
 
 
 @pytest.fixture(scope="module")
-def deep() -> Scan:
+def deep():
     """The paper's load, under which the rod sinks by 29 % of the film; the law is not stated."""
     return replace(simulated(film=LAWLESS, seed=1), film=LAWLESS)
 

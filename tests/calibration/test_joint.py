@@ -19,18 +19,17 @@ from scipy.stats import chi2
 
 import memscal
 from memscal.errors import InputError
-from memscal.model.apparatus import ParameterSet
-from memscal.model.scan import Scan, StressSensor
+from memscal.model.scan import StressSensor
 
 SEEDS = 60 if FULL else 12
 LOW, HIGH = np.sqrt(chi2.isf([1 - 1e-5, 1e-5], SEEDS) / SEEDS)
 
 
-def joint(scans: list[Scan], method: str = "bayesian", **options):
+def joint(scans, method="bayesian", **options):
     return memscal.calibrate(scans, method=method, **options).apparatus
 
 
-def several(noise: float, seed: int = 0, **options) -> list[Scan]:
+def several(noise, seed=0, **options):
     """Scans at other loads, with another rod, on another film."""
     thin = replace(EXACT_FILM, thickness=1.5e-3, name="thin")
     thick = replace(EXACT_FILM, name="thick")
@@ -63,7 +62,7 @@ def test_a_joint_fit_is_surer_than_each_of_its_scans_and_between_them():
         assert abs(together.parameters[name] - weights @ values / weights.sum()) < combined
 
 
-def assert_a_is_as_stated(parameters: ParameterSet, bounds: list[dict[str, float]]) -> None:
+def assert_a_is_as_stated(parameters, bounds):
     """Assert that A is right to what it states, which is at the bound of separate scans."""
     name = "conversion_constant"
     combined = sum(bound[name] ** -2 for bound in bounds) ** -0.5
@@ -113,7 +112,7 @@ def test_scans_of_other_sensors_or_of_films_that_contradict_are_refused():
 SOURCES = ("noise", "regularisation", "window", "baseline_curvature", "misfit")
 
 
-def moved_repeats() -> Scan:
+def moved_repeats():
     """Three passes over a sensor that moves between them."""
     points = as_points(simulate(repeats=3, points=33, noise=0.003, seed=4))
     return replace(points, x=points.x + 40e-6 * points.repeat)
@@ -169,7 +168,7 @@ def test_films_of_other_names_count_for_themselves_and_a_shared_film_once():
     assert "thickness_3" not in budget
 
 
-def correlated(scan: Scan, seed: int, reach: float = 0.4e-3) -> Scan:
+def correlated(scan, seed, reach=0.4e-3):
     """The scan with noise that forgets itself over a distance."""
     apart = np.abs(np.subtract.outer(scan.x, scan.x))
     correlation = 0.9 * np.exp(-apart / reach) + 0.1 * np.eye(scan.x.size)

@@ -3,7 +3,6 @@
 import subprocess
 import sys
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -13,19 +12,18 @@ import memscal
 from memscal.calibration import field_uncertainty, fields
 from memscal.errors import InputError
 from memscal.estimation import forward, gaussian, profile, residuals, smoothing, voltage_map
-from memscal.model.scan import Scan
 
 LINE = simulate(noise=0.005, seed=1)
 RASTER = simulate(noise=0.005, seed=1, raster=True, points=9)
 
 
-def correlated(scan: Scan) -> Scan:
+def correlated(scan):
     apart = np.abs(np.subtract.outer(np.arange(scan.x.size), np.arange(scan.x.size)))
     noise = np.full(scan.u_zz.shape, 0.005 * np.ptp(scan.u_zz))
     return replace(scan, u_zz_correlation=0.3**apart, u_zz_errors=noise)
 
 
-def correlated_with_neighbours(scan: Scan, width: int) -> list[Scan]:
+def correlated_with_neighbours(scan, width):
     """The same noise, stated for neighbours alone; its correlation ends after ``width`` points."""
     x = scan.x.size
     apart = np.abs(np.subtract.outer(np.arange(x), np.arange(x)))
@@ -67,18 +65,18 @@ def test_a_correlation_of_neighbours_that_is_none_is_refused(band, found):
     assert found in str(refusal.value)
 
 
-def with_an_outlier(scan: Scan) -> Scan:
+def with_an_outlier(scan):
     u = scan.u_zz.copy()
     u[..., 20] += 0.3 * np.ptp(u)
     return replace(scan, u_zz=u)
 
 
-def with_a_tail(raster: Scan) -> Scan:
+def with_a_tail(raster):
     """The raster of a sensor that is not round, but has a tail along x."""
     return replace(raster, u_zz=raster.u_zz + 0.3 * np.roll(raster.u_zz, 2, axis=1))
 
 
-CASES: dict[str, tuple[Any, dict[str, Any]]] = {
+CASES = {
     "line": (LINE, {}),
     "repeats": (simulate(noise=0.005, seed=2, repeats=5), {}),
     "repeats with centres": (

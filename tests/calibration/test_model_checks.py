@@ -8,12 +8,11 @@ import pytest
 from helpers.scans import RING, TAILS, simulated
 
 import memscal
-from memscal.model.checks import QualityCheck
 
 DISC = memscal.SmoothedDisc(0.8e-3, 0.3e-3)
 
 
-def checks(scan, **options) -> dict[str, QualityCheck]:
+def checks(scan, **options):
     options = {"method": "bayesian"} | options
     return {check.name: check for check in memscal.calibrate(scan, **options).apparatus.checks}
 

@@ -5,7 +5,6 @@ import shutil
 import warnings
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import h5py
 import numpy as np
@@ -14,13 +13,11 @@ from helpers.scans import LINEAR_FILM, RING, TAILS, known_apparatus, simulated
 
 import memscal
 import memscal.calibration.calibrate as calibrate_module
-from memscal import Scan
 from memscal.axisymmetry.hankel import Wavenumbers
 from memscal.cli import main
 from memscal.deconvolution.division import regulariser_names
 from memscal.extensions.simulation import rod_scan
 from memscal.mechanics.press_rod import press_rod
-from memscal.model.checks import QualityCheck
 
 pytestmark = pytest.mark.filterwarnings("ignore::memscal.errors.UnitWarning")
 
@@ -29,7 +26,7 @@ SHIPPED = Path(__file__).parents[2] / "calibration_data" / "rod_scan_65.h5"
 SCAN = memscal.simulate(film=LINEAR_FILM, seed=65)
 
 
-def altered(scan: Scan = SCAN, film: float = 1.0, x: float = 1.0, rod: float = 0.0) -> Scan:
+def altered(scan=SCAN, film=1.0, x=1.0, rod=0.0):
     """Return a scan with thickness and positions times a factor, and a rod of another radius."""
     film_ = replace(scan.film, thickness=film * scan.film.thickness)
     rod_ = memscal.Rod(radius=rod or scan.indenter.radius)
@@ -38,13 +35,13 @@ def altered(scan: Scan = SCAN, film: float = 1.0, x: float = 1.0, rod: float = 0
         return replace(scan, film=film_, x=x * scan.x, indenter=rod_)
 
 
-def refused(scan: Scan, **options: Any) -> str:
+def refused(scan, **options):
     with pytest.raises(memscal.MemscalError) as caught:
         memscal.calibrate(scan, **options)
     return str(caught.value)
 
 
-def saturation(scan: Scan) -> QualityCheck:
+def saturation(scan):
     checks = memscal.calibrate(scan).apparatus.checks
     return next(check for check in checks if check.name == "saturation")
 

@@ -10,15 +10,13 @@ from helpers.scans import CONVERSION, RING, SIGMA, TAILS, as_points, plane_error
 
 import memscal
 from memscal.calibration import fields as fields_room
-from memscal.calibration.fields import GridChoice
 from memscal.deconvolution.division import Tikhonov, regulariser_names
 from memscal.errors import InputError
-from memscal.model.checks import QualityCheck
 
 R = np.linspace(0, 3e-3, 121)
 
 
-def check(calibration: memscal.Calibration, name: str) -> QualityCheck:
+def check(calibration, name):
     return next(c for c in calibration.apparatus.checks if c.name == name)
 
 
@@ -55,7 +53,7 @@ def test_the_result_does_not_depend_on_the_grid(monkeypatch, spacing, extent):
     usual = memscal.calibrate(scan).apparatus
     chosen = fields_room.choose_grid
 
-    def other(*arguments) -> GridChoice:
+    def other(*arguments):
         choice = chosen(*arguments)
         cells = np.ceil(choice.support / (choice.spacing * spacing))
         return replace(choice, spacing=choice.support / cells, extent=choice.extent * extent)

@@ -7,17 +7,15 @@ import pytest
 from helpers.scans import simulated
 
 import memscal
-from memscal.calibration.calibrate import Calibration, calibrate, uncertainties
+from memscal.calibration.calibrate import calibrate, uncertainties
 from memscal.estimation.residuals import residuals_of
 from memscal.estimation.slow_noise import slow_noise
-from memscal.model.arrays import FloatArray
-from memscal.model.scan import Scan
 
 A = "conversion_constant"
 SIGMA = "gaussian_sigma"
 
 
-def scan_with(noise: FloatArray, *, stated: float | None = None, repeats: int = 1) -> Scan:
+def scan_with(noise, *, stated=None, repeats=1):
     """Return a simulated scan with this noise (n,), in shares of its largest signal."""
     exact = simulated(noise=0.0, repeats=repeats)
     top = np.abs(exact.u_zz).max()
@@ -26,7 +24,7 @@ def scan_with(noise: FloatArray, *, stated: float | None = None, repeats: int = 
     return replace(exact, u_zz=u, u_zz_errors=errors, synthetic=None)
 
 
-def slow(length: float, seed: int) -> FloatArray:
+def slow(length, seed):
     """Return noise of 0.5 % whose correlation falls off over so many steps; white at zero."""
     place = np.arange(200)
     correlation = np.exp(-np.abs(np.subtract.outer(place, place)) / max(length, 1e-2))
@@ -34,19 +32,19 @@ def slow(length: float, seed: int) -> FloatArray:
     return np.asarray(0.005 * noise)
 
 
-def meaning(calibration: Calibration) -> str:
+def meaning(calibration):
     """Return what the check of neighbouring residuals says."""
     checks = {check.name: check for check in calibration.apparatus.checks}
     return checks["residual_correlation"].meaning
 
 
-def told(calibration: Calibration) -> str:
+def told(calibration):
     """Return what is said where no noise is stated."""
     messages = calibration.apparatus.process.messages
     return next(message.text for message in messages if message.kind == "noise_unstated")
 
 
-def growth(calibration: Calibration) -> float:
+def growth(calibration):
     """Return u(sigma) over what it is for white noise."""
     solution = calibration.solution
     white = replace(solution, estimate=replace(solution.estimate, slow=None))

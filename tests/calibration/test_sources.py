@@ -34,7 +34,7 @@ PIXEL = 50e-6
 NAMES = {"disc": "disc:0.4mm", "slit": "slit:400um", "gaussian": "gaussian:0.4mm", "point": "point"}
 
 
-def lobed(long: float, short: float, blur: float = 0.0) -> TailedEllipse:
+def lobed(long, short, blur=0.0):
     """Elliptic Gaussian of unit integral, blurred; one that is not round has a lobe beside it."""
     wide = np.hypot(SHORT, blur)
     share = SHARE * (long != short)
@@ -42,7 +42,7 @@ def lobed(long: float, short: float, blur: float = 0.0) -> TailedEllipse:
     return TailedEllipse((ellipse, (share, *LOBE, wide, wide, 0.0)))
 
 
-def reading(kind: str, x, y):
+def reading(kind, x, y):
     """What a Gaussian sensor reads per A, at positions from its centre."""
     r = np.hypot(x, y)
     if kind == "disc":
@@ -56,7 +56,7 @@ def reading(kind: str, x, y):
     return seen * (2 * np.pi * long * short if long else 1.0)
 
 
-def scanned(kind: str, *, raster: bool = False, noise: float = 0.005, seed: int = 0, n: int = 49):
+def scanned(kind, *, raster=False, noise=0.005, seed=0, n=49):
     x = np.linspace(-2.5e-3, 2.5e-3, n)
     plane = np.meshgrid(x, x) if raster else (x, np.full(n, CENTRE[1]))
     u = A * reading(kind, plane[0] - CENTRE[0], plane[1] - CENTRE[1])
@@ -73,7 +73,7 @@ def scanned(kind: str, *, raster: bool = False, noise: float = 0.005, seed: int 
     )
 
 
-def field(long: float = LONG, short: float = SHORT) -> memscal.StressField:
+def field(long=LONG, short=SHORT):
     x = np.arange(-40, 41) * PIXEL
     values = lobed(long, short).at(*np.meshgrid(x, x)) * 2 * np.pi * long * short
     return memscal.StressField(x=x, y=x + 1e-3, values=values, unit="uT")

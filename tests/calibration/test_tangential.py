@@ -24,7 +24,7 @@ from helpers.scans import (
 from scipy.stats import binom, norm
 
 import memscal
-from memscal import Calibration, GaussianMixture, QualityCheck, Scan
+from memscal import GaussianMixture
 from memscal.errors import InputError
 
 SEEDS = 300 if os.environ.get("MEMSCAL_FULL_STUDY") else 21
@@ -37,11 +37,11 @@ OTHERS = {
 }
 
 
-def calibrated(scan: Scan, channel: str = "xz") -> Calibration:
+def calibrated(scan, channel="xz"):
     return memscal.calibrate(scan, channel=channel, method="bayesian")
 
 
-def checks_of(scan: Scan) -> dict[str, QualityCheck]:
+def checks_of(scan):
     return {check.name: check for check in calibrated(scan).apparatus.checks}
 
 
@@ -49,7 +49,7 @@ EXACT = {"film": EXACT_FILM, "rod": EXACT_ROD, "load_uncertainty": None}
 
 
 @lru_cache
-def study(noise: float) -> dict[str, np.ndarray]:
+def study(noise):
     """Errors in standard uncertainties; the film and the rod are exact, and so is the load."""
     truth = {
         "conversion_constant": SHEAR_CONVERSION,

@@ -12,10 +12,9 @@ from scipy.stats import binom
 
 import memscal
 from memscal.axisymmetry.kernels import unit_gaussian
-from memscal.deconvolution.division import Division, DivisionProblem, WhiteNoise
+from memscal.deconvolution.division import WhiteNoise
 from memscal.deconvolution.widths import kernel_functionals
 from memscal.extensions.simulation.rod_scan import PAPER_ROD
-from memscal.model.arrays import FloatArray
 
 PARAMETERS = ("conversion_constant", "gaussian_sigma", "gaussian_sigma_deconvolved")
 
@@ -127,7 +126,7 @@ class PlugIn:
     assumes = ""
     fails = ""
 
-    def divide(self, problem: DivisionProblem) -> Division:
+    def divide(self, problem):
         return WhiteNoise().divide(problem)
 
 
@@ -142,7 +141,7 @@ def test_draws_of_a_linear_division_scatter_by_its_first_order_uncertainty():
     alike(*(a.radial_uncertainty(R[R < 3e-3]) for a in (drawn, linear)))
 
 
-def functionals(g: FloatArray):
+def functionals(g):
     field = memscal.lift(R, g, R[1], R[-1])
     return {f.name: f for f in kernel_functionals(field, memscal.fit_gaussian(field, SIGMA))}
 

@@ -8,7 +8,6 @@ import re
 import shlex
 from dataclasses import asdict, replace
 from pathlib import Path
-from types import ModuleType
 
 import numpy as np
 import pytest
@@ -17,7 +16,6 @@ from helpers.scans import EXACT_FILM
 from numpy.testing import assert_allclose
 
 import memscal
-from memscal import ElasticFilm, Indenter
 from memscal.cli import main
 from memscal.formats.inspection import check
 from memscal.formats.tables.reference import read_reference_table
@@ -39,14 +37,14 @@ SETTINGS = {
 }
 
 
-def commands(block: str) -> list[list[str]]:
+def commands(block):
     """Arguments of the memscal commands in the README's code blocks of one kind."""
     blocks = re.findall(rf"^```{block}\n(.*?)^```$", README, flags=re.MULTILINE | re.DOTALL)
     lines = [shlex.split(line) for line in "".join(blocks).splitlines()]
     return [arguments for program, *arguments in lines if program == "memscal"]
 
 
-def run_all(argument_lists: list[list[str]], folder: Path) -> None:
+def run_all(argument_lists, folder):
     with contextlib.chdir(folder), pytest.MonkeyPatch.context() as patch:
         patch.setenv("SOURCE_DATE_EPOCH", "0")
         for arguments in argument_lists:
@@ -54,7 +52,7 @@ def run_all(argument_lists: list[list[str]], folder: Path) -> None:
 
 
 @pytest.fixture(scope="module")
-def rebuilt(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def rebuilt(tmp_path_factory):
     """A folder in which the README's recipe was followed."""
     folder = tmp_path_factory.mktemp("rebuilt")
     run_all(commands("sh"), folder)
@@ -62,7 +60,7 @@ def rebuilt(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def imported(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def imported(tmp_path_factory):
     """A folder in which the README's examples with the tables were followed."""
     folder = tmp_path_factory.mktemp("imported")
     (folder / "calibration_data").symlink_to(DATA)
@@ -71,25 +69,25 @@ def imported(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def calibrations() -> dict[str, memscal.Calibration]:
+def calibrations():
     rods = [*SCANS, EXPERIMENT[0]]
     return {name: memscal.calibrate(memscal.read_scan(DATA / name)) for name in rods}
 
 
 @pytest.fixture(scope="module")
-def generator() -> ModuleType:
+def generator():
     spec = importlib.util.spec_from_file_location("make_tables", DATA / "make_tables.py")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
 
 
-def numbers(table: Path) -> np.ndarray:
+def numbers(table):
     rows = [line for line in table.read_text().splitlines() if not line.startswith("#")]
     return np.genfromtxt(rows, delimiter=",", skip_header=1)
 
 
-def stated(item: ElasticFilm | Indenter) -> dict[str, float]:
+def stated(item):
     """Values of a film or an indenter, without those that are not stated."""
     return {name: value for name, value in asdict(item).items() if value is not None}
 
@@ -235,7 +233,7 @@ def test_the_finite_element_table_moves_the_result_by_less_than_its_error_allows
     assert_allclose(sheared.sigma_rz, shear, atol=4e-3 * np.abs(shear).max())
     assert table.force == pytest.approx(1.0, abs=1e-4)
 
-    def voltage(stress: np.ndarray) -> np.ndarray:
+    def voltage(stress):
         distance = np.abs(scan.x - ours.parameters["centre"])
         return np.interp(distance, table.r, ours.predict(table.r, stress))
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from helpers.console import Run, names
+from helpers.console import names
 
 import memscal
 from memscal.mechanics.press_rod import press_rod
@@ -19,12 +19,12 @@ Refused = Callable[..., None]
 
 
 @pytest.fixture
-def refused(run: Run, folder: Path) -> Refused:
+def refused(run, folder):
     """Calibrate with --force over an old output, and look for words in the refusal."""
     out = folder / "out.h5"
     out.write_bytes(OLD)
 
-    def refused_(*arguments: object, words: tuple[str, ...]) -> None:
+    def refused_(*arguments, words):
         before = names(folder)
         done = run("calibrate", *arguments, "-o", out, "--force").exits(3, *words)
         assert done.out == ""
@@ -50,7 +50,7 @@ def test_a_file_that_was_spoilt_is_refused(refused, scan, change, words):
     refused(scan, words=words)
 
 
-def altered(path: Path) -> Path:
+def altered(path):
     """Change a number in a file without its digest."""
     with h5py.File(path, "r+") as file:
         file["/entry/sample/film/thickness"][()] *= 1.001

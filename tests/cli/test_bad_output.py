@@ -3,7 +3,6 @@
 import errno
 import os
 import warnings
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -19,23 +18,23 @@ PLOT = "memscal.model.result.Result.plot"
 Patch = pytest.MonkeyPatch
 
 
-def raising(error: BaseException) -> Callable[..., None]:
+def raising(error):
     """A function that fails whatever it is given."""
 
-    def call(*_: object, **__: object) -> None:
+    def call(*_, **__):
         raise error
 
     return call
 
 
 @pytest.fixture(autouse=True)
-def _plain_figures(monkeypatch: Patch) -> None:
+def _plain_figures(monkeypatch):
     """Draw nothing: what is drawn is no matter here."""
     monkeypatch.setattr(PLOT, lambda *_, **__: Figure(figsize=(1, 1)))
 
 
 @pytest.fixture
-def no_computing(monkeypatch: Patch) -> None:
+def no_computing(monkeypatch):
     """Fail the test if the calibration is reached."""
     monkeypatch.setattr(CALIBRATE, raising(AssertionError("The calibration was reached.")))
 
@@ -92,7 +91,7 @@ def test_a_figure_that_fails_leaves_nothing(run, scan, folder, monkeypatch):
 def test_where_one_output_cannot_be_replaced_all_stay(run, scan, folder, monkeypatch):
     rename = os.replace
 
-    def replace(source: Path, target: Path) -> None:
+    def replace(source, target):
         if Path(target).name == "b.svg":
             raise OSError(errno.EIO, "broken")
         rename(source, target)
@@ -128,7 +127,7 @@ def test_a_circle_of_links_is_refused(run, scan, folder, line, code):
 def test_an_input_without_permission_is_refused_and_no_usage_error(run, scan, monkeypatch):
     """The permission is taken away for root, too."""
 
-    def denied(path: object, *arguments: object, **options: object) -> int:
+    def denied(path, *arguments, **options):
         raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), path)
 
     monkeypatch.setattr(os, "access", lambda *_, **__: False)
@@ -153,18 +152,18 @@ def test_running_out_of_memory_is_said_so(run, scan, monkeypatch):
 
 
 @pytest.fixture
-def meanwhile(monkeypatch: Patch) -> Callable[[Callable[[], object]], None]:
+def meanwhile(monkeypatch):
     """Let something happen while the calibration is computed."""
     from memscal.calibration.calibrate import calibrate
 
-    def happens(action: Callable[[], object]) -> None:
+    def happens(action):
         monkeypatch.setattr(CALIBRATE, lambda *a, **more: (action(), calibrate(*a, **more))[1])
 
     return happens
 
 
 def test_a_python_warning_becomes_one_line(run, scan, meanwhile):
-    def warn() -> None:
+    def warn():
         with warnings.catch_warnings():
             warnings.simplefilter("always")
             warnings.warn("the film is old", UserWarning, stacklevel=1)

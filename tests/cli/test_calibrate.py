@@ -1,7 +1,6 @@
 """``memscal calibrate``: what it writes, prints and returns."""
 
 import shutil
-from pathlib import Path
 
 import pytest
 from helpers.console import names
@@ -28,7 +27,7 @@ def test_a_dry_run_checks_everything_and_writes_nothing(run, scan, folder):
 
 
 @pytest.fixture
-def lawless(folder: Path) -> Path:
+def lawless(folder):
     """A scan that does not state its film's law."""
     path = folder / "scan.h5"
     memscal.write_scan(simulate(seed=1, state_law=False), path)

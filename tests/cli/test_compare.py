@@ -2,10 +2,9 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import pytest
-from helpers.console import Run, names
+from helpers.console import names
 from helpers.friction_results import comparison
 from helpers.records import assert_same
 from helpers.scans import known_apparatus, simulate_experiment
@@ -21,7 +20,7 @@ Patch = pytest.MonkeyPatch
 
 
 @pytest.fixture(scope="module")
-def bench(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def bench(tmp_path_factory):
     """A folder with a calibrated sensor, dry and lubricated contacts, and calculated contacts."""
     folder = tmp_path_factory.mktemp("bench")
     known = known_apparatus(conversion_uncertainty=0.005, width_uncertainty=0.005)
@@ -34,11 +33,11 @@ def bench(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def compare(run: Run, bench: Path, folder: Path, monkeypatch: Patch) -> Run:
+def compare(run, bench, folder, monkeypatch):
     """Compare the bench's scans in an empty folder, with a cache that the tests share."""
     monkeypatch.setattr("os.cpu_count", lambda: 1)
 
-    def compare_(*arguments: object, scans: tuple[str, ...] = ("dry.h5",)) -> Any:
+    def compare_(*arguments, scans=("dry.h5",)):
         files = [bench / "sensor.apparatus.h5", *(bench / name for name in scans)]
         assert folder == Path.cwd()
         return run("compare", *files, "--cache", bench / "cache", *arguments)

@@ -9,13 +9,13 @@ from memscal.cli.commands import COMMANDS, memscal
 from memscal.cli.options import Quantity
 
 
-def commands() -> dict[str, click.Command]:
+def commands():
     context = click.Context(memscal)
     found = {name: memscal.get_command(context, name) for name in COMMANDS}
     return {name: command for name, command in found.items() if command is not None}
 
 
-def options(command: click.Command) -> list[click.Option]:
+def options(command):
     return [option for option in command.params if isinstance(option, click.Option)]
 
 

@@ -11,7 +11,7 @@ OPTIONS = (
 )
 
 
-def write_log(last: str, level: float = 0.0) -> None:
+def write_log(last, level=0.0):
     """Write 17 presses of 20 rows, over a sensor that is a Gaussian of 1 mm."""
     x = np.repeat(np.linspace(-8, 8, 17), 20)
     pressed = np.tile(np.repeat([0.0, 1.0], 10), 17)
@@ -20,7 +20,7 @@ def write_log(last: str, level: float = 0.0) -> None:
     np.savetxt("log.csv", rows, delimiter=",", header=f"x/mm,u/mV,{last}", comments="")
 
 
-def gaussian() -> memscal.Scan:
+def gaussian():
     """Return what was imported, which is that sensor's."""
     scan = memscal.read_scan("scan.h5")
     np.testing.assert_allclose(scan.u_zz, 1e-3 * np.exp(-(scan.x**2) * 1e6), atol=2e-6)

@@ -4,7 +4,6 @@ import io
 import re
 import sys
 import time
-from collections.abc import Callable
 
 import pytest
 
@@ -18,7 +17,7 @@ class Terminal(io.StringIO):
 
     encoding = "utf-8"
 
-    def isatty(self) -> bool:
+    def isatty(self):
         return True
 
 
@@ -37,7 +36,7 @@ PLAIN = (
 )
 
 
-def at_terminal(monkeypatch: pytest.MonkeyPatch) -> Terminal:
+def at_terminal(monkeypatch):
     """Have both streams go to a terminal of 80 columns."""
     both = Terminal()
     monkeypatch.setattr(sys, "stdout", both)
@@ -85,7 +84,7 @@ def test_columns_wrap_beside_their_labels_and_none_is_lost(width):
     assert len(parts) == {40: 9, 60: 9, 80: 5, 120: 3}[width]
 
 
-def wait_for(shown: Callable[[], str], pattern: str) -> None:
+def wait_for(shown, pattern):
     """Wait for what another thread writes; on a busy machine it may come late."""
     start = time.monotonic()
     while not re.search(pattern, shown()):

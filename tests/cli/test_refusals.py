@@ -2,12 +2,10 @@
 
 import shlex
 import shutil
-from collections.abc import Callable
 from pathlib import Path
 from string import Template
 
 import pytest
-from helpers.console import Run
 
 MESH = Path(__file__).parents[1] / "data" / "vtk_film.vtu"
 TABLES = {
@@ -185,13 +183,13 @@ NOT_WRITTEN = {
 
 
 @pytest.fixture
-def refused(run: Run, scan: Path, artifact: Path, folder: Path) -> Callable[..., None]:
+def refused(run, scan, artifact, folder):
     """Run a command that is refused, in a folder that stays as it was."""
     shutil.copy(MESH, "film.vtu")
     for name, text in TABLES.items():
         Path(name).write_text(text, encoding="utf-8")
 
-    def refused_(code: int, line: str, *words: str) -> None:
+    def refused_(code, line, *words):
         before = {path: path.read_bytes() for path in folder.iterdir()}
         done = run(*shlex.split(Template(line).substitute(PARTS))).exits(code, *words)
         assert done.out == ""

@@ -14,27 +14,27 @@ LOADS = (0.69, 2.75)
 
 
 @pytest.fixture(scope="module")
-def apparatus() -> memscal.ApparatusFunction:
+def apparatus():
     return known_apparatus(conversion_uncertainty=0.01, width_uncertainty=0.01)
 
 
 @pytest.fixture(scope="module")
-def stress(apparatus: memscal.ApparatusFunction) -> memscal.MeasuredStress:
+def stress(apparatus):
     return memscal.measure_stress(contact_scan(1, load=LOADS), apparatus)
 
 
 @pytest.fixture(scope="module")
-def restored(apparatus: memscal.ApparatusFunction) -> memscal.Restoration:
+def restored(apparatus):
     return memscal.restore(sphere_scan(pressed(), seed=5), apparatus, expected=pressed())
 
 
 @pytest.fixture(scope="module")
-def contact() -> memscal.Contact:
+def contact():
     return pressed(1.0, 0.3)
 
 
 @pytest.fixture(scope="module")
-def planned() -> memscal.Design:
+def planned():
     return memscal.design(noise=0.01, want={"sigma": 0.0345}, vary="repeats")
 
 

@@ -5,7 +5,6 @@ import signal
 import subprocess
 import sys
 import time
-from pathlib import Path
 
 import pytest
 from helpers.console import names
@@ -28,7 +27,7 @@ ENDING = [(signal.SIGINT, 130), (signal.SIGTERM, 143), (signal.SIGHUP, 129)]
 EXPERIMENT = ("simulate", "--experiment", "sphere", "--contacts", "2", "--load", "1", "--force")
 
 
-def started(folder: Path) -> subprocess.Popen[str]:
+def started(folder):
     """Begin to simulate over old outputs, deaf to hang-ups, and stop before they are renamed."""
     for name in OUTPUTS:
         (folder / name).write_bytes(OLD)
@@ -48,7 +47,7 @@ def started(folder: Path) -> subprocess.Popen[str]:
     return process
 
 
-def ends(process: subprocess.Popen[str], folder: Path, code: int) -> None:
+def ends(process, folder, code):
     """Assert that a program that was signalled says so and leaves what was there."""
     shown = process.communicate(timeout=60)[1]
     assert process.returncode == code

@@ -1,7 +1,5 @@
 """``memscal calibrate --channel``: the tangential channel on the command line."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from helpers.console import names
@@ -11,7 +9,7 @@ import memscal
 
 
 @pytest.fixture
-def sheared(folder: Path) -> Path:
+def sheared(folder):
     """A scan with a tangential channel."""
     path = folder / "scan.h5"
     memscal.write_scan(shear_scan(seed=1, load=0.05), path)

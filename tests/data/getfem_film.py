@@ -7,7 +7,6 @@ Axisymmetric: x is the radius, y the height.  Taylor-Hood elements on rectangles
 """
 
 import sys
-from typing import Any
 
 import numpy as np
 
@@ -32,7 +31,7 @@ PRESSED = "X(1)*load/(2*pi*sqr(width))*exp(-sqr(X(1)/width)/2)*Test_u(2)"
 SMOOTHED = "(s - (2*G*Sym(Grad_u) - m*Id(2))):Test_s"
 
 
-def elements(mesh: Any, degree: int, *size: int) -> Any:
+def elements(mesh, degree, *size):
     """Continuous elements on rectangles."""
     import getfem
 
@@ -41,7 +40,7 @@ def elements(mesh: Any, degree: int, *size: int) -> Any:
     return found
 
 
-def main(path: str) -> None:
+def main(path):
     """Solve and save."""
     import getfem
 

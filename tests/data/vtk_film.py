@@ -5,12 +5,11 @@ tensor whose component yy carries 1 N at the base, and the stress in the cells.
 """
 
 import sys
-from typing import Any
 
 import numpy as np
 
 
-def main(path: str) -> None:
+def main(path):
     """Make the mesh and save it."""
     import vtk
 
@@ -43,7 +42,7 @@ def main(path: str) -> None:
     writer.Write()
 
 
-def add(place: Any, name: str, values: np.ndarray) -> None:
+def add(place, name, values):
     """Add a field."""
     from vtk.util.numpy_support import numpy_to_vtk
 

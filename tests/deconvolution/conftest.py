@@ -1,14 +1,13 @@
 """Division problems whose answer is known in closed form."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 import pytest
 
-from memscal.axisymmetry.grids import EvenGrid, FieldGrid, Lattice
+from memscal.axisymmetry.grids import EvenGrid, Lattice
 from memscal.axisymmetry.kernels import unit_gaussian
-from memscal.deconvolution.division import Division, DivisionProblem
+from memscal.deconvolution.division import DivisionProblem
 from memscal.model.arrays import FloatArray
 
 A = 3e-8
@@ -16,11 +15,11 @@ STRESS_WIDTH = 0.9e-3
 KERNEL_WIDTH = 0.561e-3
 
 
-def _lattice(x: float = 0.0, y: float = 0.0) -> Lattice:
+def _lattice(x=0.0, y=0.0):
     return Lattice(np.arange(-80, 81) * 0.12e-3 + x, np.arange(-70, 71) * 0.11e-3 + y)
 
 
-GRIDS: dict[str, tuple[FieldGrid, FieldGrid]] = {
+GRIDS = {
     "quarter plane": (EvenGrid(97, 0.1e-3), EvenGrid(97, 0.1e-3)),
     "lattice": (_lattice(), _lattice()),
     "lattice off centre": (_lattice(0.63e-3, -0.41e-3), _lattice()),
@@ -36,18 +35,18 @@ class Gaussians:
     stress_transform: FloatArray
     kernel_transform: FloatArray
 
-    def error(self, division: Division) -> float:
+    def error(self, division):
         """Relative L2 error of the quotient, as an image."""
         found = self.problem.grid.to_image(division.field) / A
         exact = self.problem.grid.to_image(self.exact)
         return float(np.linalg.norm(found - exact) / np.linalg.norm(exact))
 
-    def transform(self, division: Division) -> FloatArray:
+    def transform(self, division):
         """Transform of the quotient about its centre; one at zero if A is right."""
         return self.problem.grid.transfer(division.field) / A
 
 
-def _make(grid_name: str = "quarter plane", weakest: float = 1e-3) -> Gaussians:
+def _make(grid_name="quarter plane", weakest=1e-3):
     grid, centred = GRIDS[grid_name]
     k = np.sqrt(-2 * np.log(weakest)) / STRESS_WIDTH
     both = float(np.hypot(STRESS_WIDTH, KERNEL_WIDTH))
@@ -64,12 +63,12 @@ def _make(grid_name: str = "quarter plane", weakest: float = 1e-3) -> Gaussians:
 
 
 @pytest.fixture
-def gaussians() -> Callable[..., Gaussians]:
+def gaussians():
     """Return the maker of problems: by the grid's name and the weakest relevant component."""
     return _make
 
 
 @pytest.fixture(params=GRIDS)
-def on_each_grid(request: pytest.FixtureRequest) -> Callable[..., Gaussians]:
+def on_each_grid(request):
     """Return the maker of problems on one of the grids."""
     return lambda weakest=1e-3: _make(request.param, weakest)

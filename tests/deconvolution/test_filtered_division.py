@@ -6,23 +6,22 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.special import expm1
 
-from memscal.axisymmetry.grids import EvenGrid, FieldGrid, Lattice
+from memscal.axisymmetry.grids import EvenGrid, Lattice
 from memscal.deconvolution.division import (
     DivisionProblem,
     Tikhonov,
     WhiteNoise,
     filtered_division,
 )
-from memscal.model.arrays import FloatArray
 
 SEEDS = st.integers(0, 2**32 - 1)
 
 
-def small_lattice() -> Lattice:
+def small_lattice():
     return Lattice((np.arange(9) - 4) * 0.5, (np.arange(7) - 3) * 0.4)
 
 
-def random_problem(seed: int, grid: FieldGrid) -> tuple[DivisionProblem, FloatArray]:
+def random_problem(seed, grid):
     """A random kernel behind a stress whose transform has no zero."""
     rng = np.random.default_rng(seed)
     shape = grid.radius.shape

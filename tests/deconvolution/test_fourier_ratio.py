@@ -16,12 +16,12 @@ WIDTH = 0.561e-3
 CONVERSION = 1e-7
 
 
-def gaussian(width: float) -> memscal.Field:
+def gaussian(width):
     """A Gaussian of unit integral, lifted."""
     return memscal.lift(R, unit_gaussian(R, width), SPACING, EXTENT)
 
 
-def voltage_and_stress() -> tuple[memscal.Field, memscal.Field]:
+def voltage_and_stress():
     """Fields of a sensor with a Gaussian G: the widths add up in squares."""
     blurred = gaussian(np.hypot(STRESS_WIDTH, WIDTH))
     return memscal.Field(blurred.grid, CONVERSION * blurred.values), gaussian(STRESS_WIDTH)

@@ -40,7 +40,7 @@ class Impostor:
 
 
 @pytest.fixture
-def plug_in(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def plug_in(tmp_path, monkeypatch):
     """An installed distribution with two entry points, one of a name that is taken."""
     (tmp_path / "sharp_edges.py").write_text(PLUG_IN, encoding="utf-8")
     info = tmp_path / "sharp_edges-1.0.dist-info"

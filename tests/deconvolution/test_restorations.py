@@ -10,18 +10,17 @@ from memscal.axisymmetry.grids import Lattice
 from memscal.axisymmetry.kernels import unit_gaussian
 from memscal.deconvolution.division import (
     DivisionProblem,
-    Regulariser,
     Tikhonov,
     Wiener,
 )
 
 PAGE = Path(__file__).parents[2] / "docs" / "own_method.md"
-OWN: dict[str, type] = {"__name__": "own_method"}
+OWN = {"__name__": "own_method"}
 exec(re.findall(r"^```python\n(.*?)^```$", PAGE.read_text(), re.MULTILINE | re.DOTALL)[0], OWN)
 CLASSICAL = [Wiener(), OWN["UnsupervisedWiener"](), OWN["RichardsonLucy"]()]
 
 
-def named(regulariser: Regulariser) -> str:
+def named(regulariser):
     return regulariser.name
 
 

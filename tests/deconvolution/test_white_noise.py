@@ -14,19 +14,19 @@ from memscal.deconvolution.division import (
 )
 
 
-def square_lattice(count: int, step: float = 0.5) -> Lattice:
+def square_lattice(count, step=0.5):
     axis = (np.arange(count) - count // 2) * step
     return Lattice(axis, axis)
 
 
-def spike(grid: Lattice, height: float) -> np.ndarray:
+def spike(grid, height):
     """A field of the same transform, ``height``, at every wavenumber."""
     field = np.zeros((grid.y.size, grid.x.size))
     field[0, 0] = height / grid.cell_area
     return field
 
 
-def truncated_mean_bound(count: int, cut: float) -> float:
+def truncated_mean_bound(count, cut):
     """Largest error of the mean of ``count`` values 1/(z + n) cut off at |z + n| < ``cut``.
 
     For E|n|^2 = 1.  The density of z + n is at most 1/pi, so that E|1/(z + n)|^2 without the

@@ -5,12 +5,11 @@ import pytest
 from helpers.scans import RING, TAILS, estimated, simulated
 
 import memscal
-from memscal.estimation.band import Band, find_band, transfer_uncertainty
-from memscal.estimation.profile import ProfileEstimate
+from memscal.estimation.band import find_band, transfer_uncertainty
 from memscal.estimation.smoothing import smooth_profile
 
 
-def band_of(estimate: ProfileEstimate) -> Band:
+def band_of(estimate):
     return find_band(estimate, smooth_profile(estimate))
 
 

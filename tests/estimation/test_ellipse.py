@@ -12,20 +12,19 @@ from scipy.stats import chi2
 import memscal
 from memscal.axisymmetry.kernels import unit_gaussian
 from memscal.estimation.ellipse import elliptic_columns, elliptic_departure
-from memscal.model.scan import Scan
 
 SEEDS = 40 if FULL else 5
 LAYOUT = {"side": 17, "half": 4e-3}
 
 
-def ellipse(e: tuple[float, float]) -> TailedEllipse:
+def ellipse(e):
     """The elliptic Gaussian of this ellipticity."""
     size = np.hypot(*e)
     widths = SIGMA * np.sqrt([1 + size, 1 - size])
     return TailedEllipse(((1.0, 0.0, 0.0, *widths, np.arctan2(e[1], e[0]) / 2),))
 
 
-def elliptic_scan(e: tuple[float, float], seed: int) -> Scan:
+def elliptic_scan(e, seed):
     """A raster through it, by direct convolution: not by harmonics."""
     scan = tailed_raster(seed=seed, noise=0.01, kernel=ellipse(e), **LAYOUT)
     return replace(scan, u_zz_errors=np.full(scan.u_zz.shape, scan.synthetic["noise"]))

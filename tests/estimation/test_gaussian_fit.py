@@ -9,7 +9,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import memscal
-from memscal import Scan
 from memscal.axisymmetry.kernels import gaussian_transfer
 from memscal.errors import FitError
 from memscal.estimation.forward import ForwardModel
@@ -17,13 +16,13 @@ from memscal.estimation.gaussian import fit_gaussian_to_points
 from memscal.estimation.points import measured_points
 
 
-def forward(scan: Scan) -> ForwardModel:
+def forward(scan):
     points = measured_points(scan)
     contact = memscal.indent(scan.film, scan.indenter, load=1.0)
     return ForwardModel(points, (reference_spectrum(contact, points),))
 
 
-def fit(scan: Scan):
+def fit(scan):
     model = forward(scan)
     return fit_gaussian_to_points(model, np.ones_like(model.points.u))
 

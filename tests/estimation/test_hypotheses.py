@@ -56,7 +56,7 @@ def test_linearity_and_hysteresis_are_tested_only_where_loads_and_branches_diffe
         assert hysteresis_test(estimated(simulated(**BOTH | {"branch": branch}))) is None
 
 
-def hysteretic(seed: int, conversion: float = 0.0, play: float = 0.0, step: float = 0.0) -> Scan:
+def hysteretic(seed, conversion=0.0, play=0.0, step=0.0):
     """Two scans, of sensors that differ in A and centre, as approach and retreat of one."""
     rows = [
         simulated(
@@ -91,18 +91,18 @@ PASSES = line(step=0.5e-3)
 
 
 def passes(
-    seed: int,
+    seed,
     *,
-    pairs: int = 1,
-    lag: float = 0.0,
-    creep: float = 0.0,
-    play: float = 0.0,
-    wander: float = 0.0,
-    louder: float = 1.0,
-    offset: float = 0.0,
-    stated: bool = True,
-    named: bool = True,
-) -> Scan:
+    pairs=1,
+    lag=0.0,
+    creep=0.0,
+    play=0.0,
+    wander=0.0,
+    louder=1.0,
+    offset=0.0,
+    stated=True,
+    named=True,
+):
     """Passes forth and back over a sensor, each pair with its own disturbances."""
     side = np.tile([1.0, -1.0], pairs)
     rng = np.random.default_rng(seed)

@@ -10,7 +10,6 @@ from scipy.stats import binom, chi2, f
 
 from memscal.estimation.residuals import (
     Residuals,
-    TestOutcome,
     chi_square_test,
     free_model,
     neighbour_correlation_test,
@@ -19,10 +18,9 @@ from memscal.estimation.residuals import (
     ring_test,
     steps_test,
 )
-from memscal.model.scan import Scan
 
 
-def made(values: np.ndarray, passes: int = 1) -> Residuals:
+def made(values, passes=1):
     """Residuals that are independent already, but for a last point that takes one parameter."""
     n = values.size
     place = np.arange(n + 1)
@@ -92,7 +90,7 @@ def test_the_neighbours_correlation_does_not_depend_on_the_noise_s_size():
     assert other.p_value == pytest.approx(one.p_value)
 
 
-def pure_error(scan: Scan) -> TestOutcome | None:
+def pure_error(scan):
     estimate = estimated(scan)
     return pure_error_test(estimate, free_model(estimate))
 

@@ -24,7 +24,7 @@ def test_the_division_is_linear_in_the_voltages():
     choice = choose_grid(estimate, band)
     weakest = (band.weakest_reference, band.weakest_voltage)
 
-    def divided(voltage: np.ndarray) -> np.ndarray:
+    def divided(voltage):
         spectrum = replace(estimate.model.reference, values=smoothed.gain @ voltage)
         fields = LineFields.lift(estimate, spectrum, choice)
         quotient = divide(fields.voltage, fields.stress, weakest=weakest, method=WhiteNoise())

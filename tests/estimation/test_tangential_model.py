@@ -13,12 +13,11 @@ from memscal.estimation.forward import ForwardModel
 from memscal.estimation.points import ScanPoints, measured_points
 from memscal.estimation.reference_spectra import reference_spectra
 from memscal.extensions.simulation.rod_scan import PAPER_ROD
-from memscal.model.arrays import FloatArray
 
 KERNEL = GaussianMixture((1.4, -0.4), (450e-6, 250e-6))
 
 
-def planar_points(x: FloatArray, y: FloatArray, channel: str) -> ScanPoints:
+def planar_points(x, y, channel):
     """Points anywhere on the plane, at a load of 2 N."""
     n = x.size
     return ScanPoints(
@@ -39,7 +38,7 @@ def planar_points(x: FloatArray, y: FloatArray, channel: str) -> ScanPoints:
     )
 
 
-def model_at(x: FloatArray, y: FloatArray, channel: str = "xz") -> ForwardModel:
+def model_at(x, y, channel="xz"):
     scan = memscal.simulate()
     contact = memscal.indent(scan.film, scan.indenter, load=1.0, strain="linear")
     points = planar_points(x, y, channel)
@@ -81,7 +80,7 @@ def test_derivatives_by_centre_and_distance_are_those_of_the_signal():
     model = model_at(x, y)
     kernel = KERNEL.transform(model.k)
 
-    def signal(at: FloatArray) -> FloatArray:
+    def signal(at):
         return model.signal(model.geometry(at), kernel)
 
     step = 1e-7

@@ -3,11 +3,9 @@
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
-from typing import Any
 
 import pytest
 from helpers.scans import simulate
-from matplotlib.figure import Figure
 
 import memscal
 from memscal import ApparatusFunction
@@ -18,19 +16,19 @@ MakeApparatus = Callable[..., ApparatusFunction]
 
 
 @cache
-def calibrated(**scan: Any) -> ApparatusFunction:
+def calibrated(**scan):
     """Calibrate a simulated scan, once for all tests."""
     return memscal.calibrate(simulate(seed=1, **scan), other=False).apparatus
 
 
 def build(
     *,
-    failed: int = 0,
-    meaning: str = "The scan is not explained to within its noise.",
-    message: str = "1 outlier was down-weighted at x = 2.25 mm.",
-    sensor: memscal.StressSensor | None = None,
-    **scan: Any,
-) -> ApparatusFunction:
+    failed=0,
+    meaning="The scan is not explained to within its noise.",
+    message="1 outlier was down-weighted at x = 2.25 mm.",
+    sensor=None,
+    **scan,
+):
     """Return a calibration of which the first checks fail."""
     data = calibrated(**scan)
     checks = enumerate(data.checks)
@@ -43,17 +41,17 @@ def build(
 
 
 @pytest.fixture(name="make_apparatus", scope="session")
-def make_apparatus_fixture() -> MakeApparatus:
+def make_apparatus_fixture():
     """Return the builder of calibrations."""
     return build
 
 
 @pytest.fixture(name="drawn", scope="session")
-def drawn_fixture() -> Callable[..., Figure]:
+def drawn_fixture():
     """Return the figure of a calibration, drawn once for all tests that only look at it."""
 
     @cache
-    def drawn(**options: Any) -> Figure:
+    def drawn(**options):
         return calibration_figure(build(**options))
 
     return drawn

@@ -13,7 +13,6 @@ from scipy.interpolate import CubicSpline
 import memscal
 from memscal.figures.calibration import calibration_figure
 from memscal.figures.style import panels_of
-from memscal.model.apparatus import ApparatusData
 from memscal.model.scan import StressSensor
 
 NOISY = {"noise": 0.05}
@@ -227,7 +226,7 @@ def test_the_settings_of_matplotlib_are_given_back():
 
 
 @pytest.fixture(scope="module")
-def sheared() -> ApparatusData:
+def sheared():
     """An artifact of channel xz."""
     return memscal.calibrate(shear_scan(seed=1), channel="xz", method="evidence").apparatus
 

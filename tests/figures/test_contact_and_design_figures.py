@@ -3,17 +3,15 @@
 import numpy as np
 import pytest
 from helpers.paper import FILM, SPHERE
-from matplotlib.lines import Line2D
 
 import memscal
 from memscal.errors import InputError
-from memscal.extensions.planning.design import Design
 from memscal.extensions.planning.figure import design_figure
 from memscal.figures.stress import contact_figure
 from memscal.mechanics.indent import indent
 
 
-def curve(axes, color: str, style: str) -> Line2D:
+def curve(axes, color, style):
     (found,) = (
         line
         for line in axes.lines
@@ -44,7 +42,7 @@ def test_one_contact_shows_its_tractions_and_its_base():
 
 
 @pytest.fixture(scope="module")
-def planned() -> Design:
+def planned():
     return memscal.design(step=0.5e-3, repeats=2)
 
 

@@ -1,7 +1,6 @@
 """Every figure keeps the same rules of words, units and layout, and an SVG holds them as text."""
 
 import re
-from collections.abc import Callable, Iterator
 from functools import cache
 from itertools import combinations, starmap
 
@@ -11,8 +10,6 @@ from helpers.builders import make_sweep
 from helpers.friction_results import comparison, interface_comparison
 from helpers.paper import FILM, SPHERE
 from helpers.scans import known_apparatus, measured, pressed, sphere_scan
-from matplotlib.figure import Figure
-from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 
 import memscal
@@ -27,11 +24,11 @@ WITHOUT_UNCERTAINTIES = {"contacts", "sweep", "fleet"}
 
 
 @cache
-def compared() -> memscal.FrictionComparison:
+def compared():
     return comparison(lubrications=STATES, interface=interface_comparison())
 
 
-def fleet() -> FleetResults:
+def fleet():
     values = 1e-4 * (1 + 0.01 * np.random.default_rng(1).normal(size=60))
     x, y = np.divmod(np.arange(60.0), 8)
     return FleetResults(
@@ -48,7 +45,7 @@ def fleet() -> FleetResults:
     )
 
 
-FIGURES: dict[str, Callable[..., Figure]] = {
+FIGURES = {
     "failed": lambda make: calibration_figure(make(failed=1, meaning="They are 31 um apart.")),
     "raster": lambda make: calibration_figure(make(raster=True, points=25)),
     "loads": lambda make: calibration_figure(make(load=(0.5, 1.0, 2.0), points=33)),
@@ -67,12 +64,12 @@ FIGURES: dict[str, Callable[..., Figure]] = {
 }
 
 
-def contacts() -> list[memscal.Contact]:
+def contacts():
     return memscal.indent(FILM, SPHERE, load=[0.34, 2.75], friction=0.2)
 
 
 @pytest.fixture(name="figure", scope="module", params=FIGURES)
-def figure_fixture(request, make_apparatus) -> Iterator[Figure]:
+def figure_fixture(request, make_apparatus):
     figure = FIGURES[request.param](make_apparatus)
     figure.set_label(request.param)
     with house_style():  # as it is rendered: the number of ticks depends on their size
@@ -80,7 +77,7 @@ def figure_fixture(request, make_apparatus) -> Iterator[Figure]:
         yield figure
 
 
-def words(figure: Figure) -> list[Text]:
+def words(figure):
     """Texts that are drawn: not the ticks beyond an axis, not what is empty or hidden."""
     texts = list(figure.texts)
     axes = [each for each in figure.axes if each.axison]
@@ -113,7 +110,7 @@ def test_no_text_lies_on_another_or_leaves_the_page(figure):
     outside += [t.get_text() for t, box in boxes if not page.contains(*box.max)]
     assert outside == []
 
-    def overlap(one: tuple[Text, Bbox], other: tuple[Text, Bbox]) -> list[str]:
+    def overlap(one, other):
         common = Bbox.intersection(one[1], other[1])
         # Boxes have room for ascenders: letters that are a pixel into it do not touch.
         touching = common is not None and min(common.width, common.height) > 1.5

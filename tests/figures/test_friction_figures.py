@@ -5,7 +5,6 @@ import math
 import numpy as np
 import pytest
 from helpers.friction_results import LOADS, comparison, interface_comparison, stress
-from matplotlib.axes import Axes
 
 from memscal.errors import InputError
 from memscal.extensions.interface_laws.figure import interface_figure
@@ -16,15 +15,14 @@ from memscal.figures.friction_profiles import (
     profile_figure,
 )
 from memscal.figures.style import render_figure
-from memscal.friction.results import FrictionComparison
 
 
 @pytest.fixture(scope="module")
-def found() -> FrictionComparison:
+def found():
     return comparison()
 
 
-def bars(axes: Axes) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+def bars(axes):
     """Abscissae, values and expanded uncertainties of the error bars in a panel."""
     drawn = []
     for points, _, (stems,) in axes.containers:

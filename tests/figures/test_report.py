@@ -16,12 +16,12 @@ _HOSTILE = "<script>alert('x')</script>\"&$title ${body} --><img src=x onerror=1
 class Page(HTMLParser):
     """What a reader of the page finds: elements with their attributes, text, balance."""
 
-    def __init__(self, text: str) -> None:
+    def __init__(self, text):
         super().__init__(convert_charrefs=True)
-        self.elements: list[tuple[str, dict[str, str | None]]] = []
-        self.open: list[str] = []
-        self.words: list[str] = []
-        self.rows: list[list[str]] = []
+        self.elements = []
+        self.open = []
+        self.words = []
+        self.rows = []
         self.feed(text)
         self.close()
 

@@ -3,22 +3,19 @@
 import numpy as np
 import pytest
 from helpers.scans import contact_scan, known_apparatus, pressed, sphere_scan
-from matplotlib.axes import Axes
 
 import memscal
 from memscal.figures.stress import measured_stress_figure, restoration_figure
-from memscal.measurement.restoration import Restoration
-from memscal.model.measured_stress import MeasuredStress
 
 
 @pytest.fixture(scope="module")
-def stress() -> MeasuredStress:
+def stress():
     lubricated = contact_scan(2, load=(0.34,), lubrication="lubricated")
     scans = [contact_scan(1, load=(0.34, 2.75)), lubricated]
     return memscal.measure_stress(scans, known_apparatus(conversion_uncertainty=0.01))
 
 
-def points(axes: Axes) -> np.ndarray:
+def points(axes):
     """All points that are drawn with a mark, shape (n, 2), in order."""
     drawn = [line.get_xydata() for line in axes.lines if line.get_marker() in ("o", "s")]
     together = np.concatenate([np.asarray(d) for d in drawn if len(d)])
@@ -42,11 +39,11 @@ def test_the_bars_are_two_standard_uncertainties(stress):
 
 
 @pytest.fixture(scope="module")
-def restoration() -> Restoration:
+def restoration():
     return memscal.restore(sphere_scan(pressed(), seed=1), known_apparatus(), expected=pressed())
 
 
-def lines(axes) -> dict[str, object]:
+def lines(axes):
     return {line.get_label(): line for line in axes.lines}
 
 

@@ -7,7 +7,6 @@ import stat
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -21,28 +20,28 @@ OLD = b"the old output"
 
 
 @pytest.fixture
-def target(folder: Path) -> Path:
+def target(folder):
     path = folder / "out.h5"
     path.write_bytes(OLD)
     return path
 
 
-def fail_with(code: int) -> Any:
-    def fail(*arguments: Any, **options: Any) -> Any:
+def fail_with(code):
+    def fail(*arguments, **options):
         raise OSError(code, os.strerror(code))
 
     return fail
 
 
-def write_new(path: Path | str) -> None:
+def write_new(path):
     atomic_write_bytes(path, b"new", overwrite=True)
 
 
-def prove_writable(path: Path | str) -> None:
+def prove_writable(path):
     ensure_writable(path, overwrite=True)
 
 
-def assert_refused(path: Path | str, words: str) -> None:
+def assert_refused(path, words):
     for attempt in (prove_writable, write_new):
         with pytest.raises(OutputError, match=words) as caught:
             attempt(path)
@@ -50,7 +49,7 @@ def assert_refused(path: Path | str, words: str) -> None:
         assert str(path) in caught.value.problem
 
 
-def assert_untouched(target: Path) -> None:
+def assert_untouched(target):
     assert target.read_bytes() == OLD
     assert os.listdir(target.parent) == [target.name]
 
@@ -95,7 +94,7 @@ def test_short_writes_are_continued(monkeypatch):
 
 
 def test_an_interrupt_leaves_no_temporary_file(target, monkeypatch):
-    def interrupt(*arguments: Any) -> None:
+    def interrupt(*arguments):
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
@@ -109,7 +108,7 @@ def test_a_file_that_appears_late_is_not_replaced(monkeypatch):
     target = Path("out.h5")
     fsync = os.fsync
 
-    def appear(descriptor: int) -> None:
+    def appear(descriptor):
         fsync(descriptor)
         target.write_bytes(OLD)
 
@@ -164,7 +163,7 @@ def test_a_folder_in_which_nothing_can_be_made_is_refused_before_the_work():
     assert caught.value.exit_code == 4
 
 
-def three() -> list[Path]:
+def three():
     """Two old outputs and a new one."""
     paths = [Path(name) for name in ("a", "b", "c")]
     for path in paths[:2]:
@@ -172,7 +171,7 @@ def three() -> list[Path]:
     return paths
 
 
-def write_together(paths: list[Path], stop: BaseException | None = None) -> None:
+def write_together(paths, stop=None):
     """Write files into a folder that is made for them; then stop."""
     with together(paths[-1].parent):
         for path in paths:
@@ -191,7 +190,7 @@ def test_files_that_are_written_together_are_all_new_or_all_as_before(
     paths = three()
     rename = os.replace
 
-    def replace(source: Path, target: Path) -> None:
+    def replace(source, target):
         if Path(target).name == failing:
             raise OSError(errno.EIO, "broken")
         rename(source, target)

@@ -15,14 +15,13 @@ from memscal.formats.cache import (
     table_key,
 )
 from memscal.formats.hdf5.writer import Group, file_tree, write_tree
-from memscal.model.arrays import FloatArray
 
 pytestmark = pytest.mark.usefixtures("folder")
 
 KEY = table_key({"load": 0.34})
 
 
-def table(values: int = 3) -> dict[str, FloatArray]:
+def table(values=3):
     rng = np.random.default_rng(1)
     whole = (values, 2, 64)
     part = (values, 2)
@@ -40,15 +39,15 @@ def table(values: int = 3) -> dict[str, FloatArray]:
     }
 
 
-def entry(key: str = KEY) -> Path:
+def entry(key=KEY):
     return Path(f"{key}.h5")
 
 
-def keep(key: str = KEY) -> bool:
+def keep(key=KEY):
     return keep_contact_table(Path(), key, table())
 
 
-def find(key: str = KEY) -> dict[str, FloatArray] | None:
+def find(key=KEY):
     return find_contact_table(Path(), key)
 
 
@@ -124,7 +123,7 @@ def test_several_may_write_and_read_one_entry_at_a_time():
     large = table(3)
     small = {name: array for name, array in large.items() if not name.startswith("change_")}
 
-    def work(number: int) -> bool:
+    def work(number):
         keep_contact_table(Path(), KEY, small if number % 2 else large)
         found = find()
         return found is not None and np.array_equal(found["spectra"], small["spectra"])

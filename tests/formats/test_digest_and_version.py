@@ -1,6 +1,5 @@
 """An altered artifact is refused; a newer major version is refused; a newer minor one is not."""
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -22,17 +21,17 @@ pytestmark = pytest.mark.usefixtures("folder")
 
 
 @pytest.fixture
-def artifact(folder: Path) -> Path:
+def artifact(folder):
     write_artifact(make_artifact(), "a.h5")
     return folder / "a.h5"
 
 
-def altered(path: str, index: Any, change: Callable[[Any], Any]) -> Callable[[h5py.File], None]:
+def altered(path, index, change):
     """A change of the values of a dataset."""
     return lambda file: file[path].__setitem__(index, change(file[path][index]))
 
 
-def new_text(file: h5py.File) -> None:
+def new_text(file):
     del file["/entry/process/date"]
     file["/entry/process"]["date"] = np.bytes_("2034-01-02T03:04:05+00:00")
 
@@ -83,7 +82,7 @@ ADDITIONS = {
     "reference": ["parameters/depth", "parameters/film/name", "reference/sigma_zz_errors"],
     "artifact": ["sample/film/roughness_rms", "instrument/stress_sensor/serial_number"],
 }
-READERS: dict[str, Any] = {
+READERS = {
     "scan": read_scan,
     "reference": read_reference,
     "artifact": load_apparatus,
@@ -125,7 +124,7 @@ def test_no_reader_uses_what_was_added_or_changed_unless_that_is_accepted(kind, 
 
 
 @pytest.fixture(params=["scan", "reference", "artifact"])
-def versioned(request: pytest.FixtureRequest, folder: Path) -> Any:
+def versioned(request, folder):
     path = folder / f"{request.param}.h5"
     write: Any
     read: Any
@@ -136,7 +135,7 @@ def versioned(request: pytest.FixtureRequest, folder: Path) -> Any:
     }[str(request.param)]
     write(thing, path)
 
-    def read_version(version: str) -> Any:
+    def read_version(version):
         with h5py.File(path, "r+") as file:
             file.attrs["memscal_schema_version"] = version
             file["/entry/of_the_future"] = h5py.Empty("f8")

@@ -2,7 +2,6 @@
 
 from contextlib import nullcontext
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -17,7 +16,7 @@ N = 15
 X = np.arange(N) - 7.0
 U = np.round(0.02 + 1.5 * np.exp(-((X / 2) ** 2)), 4)
 #: Cells by their names in the templates of rows.
-CELLS: dict[str, list[Any]] = {
+CELLS = {
     "X": [f"{x:.2f}" for x in X],
     "U": [f"{u:.4f}" for u in U],
     "V": [f"{2 * u:.4f}" for u in U],
@@ -42,7 +41,7 @@ AFTER_INDEX = {**BY_NUMBER, "x": 2, "u": 3}
 NO_UNITS = {"x_unit": "mm", "u_unit": "mV"}
 
 
-def scan_of(tables: str, **options: Any) -> Any:
+def scan_of(tables, **options):
     """Import tables, parted by &: a head, ~, and the template of a row."""
     text = ""
     for table in tables.split("&"):

@@ -47,9 +47,7 @@ print(read, refused)
 Edit = Callable[[Callable[[h5py.Group], Any]], Path]
 
 
-def filtered(
-    group: h5py.Group, size: int, chunk: int, flag: int, filters: list[tuple[int, Any]]
-) -> h5py.Dataset:
+def filtered(group, size, chunk, flag, filters):
     """Make u_zz with filters in an order or of a kind that h5py's own interface does not offer."""
     plist = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
     plist.set_chunk((chunk,))
@@ -61,7 +59,7 @@ def filtered(
 
 
 @pytest.fixture
-def path(folder: Path) -> Path:
+def path(folder):
     """A good scan without a digest, as another program writes it."""
     path = folder / "scan.h5"
     write_scan(make_scan(), path)
@@ -71,10 +69,10 @@ def path(folder: Path) -> Path:
 
 
 @pytest.fixture
-def edited(path: Path) -> Edit:
+def edited(path):
     """Return a function that replaces u_zz of a good scan by something else."""
 
-    def edit(make: Callable[[h5py.Group], Any]) -> Path:
+    def edit(make):
         with h5py.File(path, "r+") as file:
             del file[SIGNAL]
             made = make(file["/entry/data"])
@@ -85,7 +83,7 @@ def edited(path: Path) -> Edit:
     return edit
 
 
-def assert_refused_cheaply(path: Path, *words: str) -> None:
+def assert_refused_cheaply(path, *words):
     """The refusal names file and path, and costs less memory than twenty times the file."""
     tracemalloc.start()
     try:
@@ -167,7 +165,7 @@ def test_a_dataset_that_cannot_be_read_safely_is_refused(edited, make, words):
 
 
 @lru_cache
-def compressed(size: int) -> bytes:
+def compressed(size):
     """Zeros, compressed."""
     return zlib.compress(bytes(size))
 
@@ -184,7 +182,7 @@ def compressed(size: int) -> bytes:
 def test_a_chunk_that_does_not_unpack_to_its_size_is_refused(edited, filters, number):
     """HDF5 unpacks all of it: of half a megabyte 562 MB were held, and the file passed."""
 
-    def make(group: h5py.Group) -> h5py.Dataset:
+    def make(group):
         dataset = group.create_dataset("u_zz", (1024,), "f8", chunks=(1024,), **filters)
         dataset.id.write_direct_chunk((0,), compressed(8 * number))
         return dataset
@@ -201,7 +199,7 @@ def test_a_packed_chunk_is_read_whatever_the_order_of_its_filters(edited, order)
         (getattr(h5py.h5z, f"FILTER_{name.upper()}"), options[name]) for name in order.split()
     ]
 
-    def make(group: h5py.Group) -> h5py.Dataset:
+    def make(group):
         dataset = filtered(group, 33, 20, h5py.h5z.FLAG_MANDATORY, filters)
         dataset[:] = np.arange(33.0)
         return dataset
@@ -263,7 +261,7 @@ def test_filters_that_expand_twice_or_load_foreign_code_are_refused(
     ids=["vlen", "vlen text", "compound", "complex", "text", "opaque", "enum"],
 )
 def test_a_type_that_is_no_plain_number_is_refused(edited, dtype, value):
-    def make(group: h5py.Group) -> Any:
+    def make(group):
         dataset = group.create_dataset("u_zz", (2**16,), dtype)  # a bomb, were it to be expanded
         dataset[0] = value
         return dataset
@@ -279,7 +277,7 @@ def test_a_group_in_the_place_of_a_dataset_is_refused(edited):
 def test_one_dataset_of_many_names_meets_the_limit_of_the_file(edited, monkeypatch):
     monkeypatch.setattr(limits, "MOST_HDF5_BYTES", 2**17)
 
-    def make(group: h5py.Group) -> None:
+    def make(group):
         group.create_dataset("u_zz", data=np.zeros(2**13), compression="gzip")  # 64 KiB
         group["u_zz"].attrs["units"] = "mV"
         del group["u_xz"]

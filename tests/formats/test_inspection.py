@@ -18,7 +18,7 @@ from memscal.model.provenance import timestamp
 
 
 @pytest.fixture(autouse=True)
-def _files(folder: Path) -> None:
+def _files(folder):
     write_scan(make_scan("raster"), "scan.h5")
     write_reference(make_profile(friction_coefficient=float("inf")), "reference.h5")
     write_artifact(make_artifact(), "artifact.h5")

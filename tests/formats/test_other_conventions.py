@@ -1,7 +1,5 @@
 """Scans in which other programs state axes, scales and missing values in their own ways."""
 
-from pathlib import Path
-
 import h5py
 import numpy as np
 import pytest
@@ -15,7 +13,7 @@ SIDE = np.linspace(-4e-3, 4e-3, 9)
 U = np.exp(-((SIDE - 1e-3) ** 2 + (SIDE[:, None] + 2e-3) ** 2) / 8e-6)
 
 
-def scales(file: h5py.File, order: str) -> None:
+def scales(file, order):
     for i, name in enumerate(order):
         file[name].make_scale(name)
         file["u_zz"].dims[i].attach_scale(file[name])
@@ -34,7 +32,7 @@ WAYS = {
 
 
 @pytest.fixture
-def path(tmp_path: Path) -> Path:
+def path(tmp_path):
     """A square raster whose axes nothing states, as another program may write it."""
     path = tmp_path / "scan.h5"
     write_scan(make_scan(), path)

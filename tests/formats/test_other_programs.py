@@ -1,9 +1,5 @@
 """The files as other programs of the field see them."""
 
-from collections.abc import Callable
-from pathlib import Path
-from typing import Any
-
 import h5py
 import netCDF4
 import pytest
@@ -16,7 +12,7 @@ from memscal.formats.artifact import write_artifact
 from memscal.formats.reference import write_reference
 from memscal.formats.scan import write_scan
 
-WRITERS: dict[str, Callable[[Path], None]] = {
+WRITERS = {
     "line": lambda path: write_scan(make_scan("line"), path),
     "repeats": lambda path: write_scan(make_scan("repeats"), path),
     "raster": lambda path: write_scan(make_scan("raster"), path),
@@ -29,23 +25,23 @@ DEFAULTS = {"reference": "/entry/reference", "artifact": "/entry/apparatus_funct
 
 
 @pytest.fixture(params=WRITERS)
-def kind(request: pytest.FixtureRequest) -> str:
+def kind(request):
     return str(request.param)
 
 
 @pytest.fixture
-def path(kind: str, tmp_path: Path) -> Path:
+def path(kind, tmp_path):
     file = tmp_path / f"{kind}.h5"
     WRITERS[kind](file)
     return file
 
 
-def items(path: Path) -> tuple[list[str], dict[str, Any]]:
+def items(path):
     """Return the paths of all groups, and of all datasets with shape and attributes."""
     groups = ["/"]
     datasets = {}
 
-    def visit(name: str, item: Any) -> None:
+    def visit(name, item):
         if isinstance(item, h5py.Group):
             groups.append(f"/{name}")
         else:

@@ -3,7 +3,6 @@
 import dataclasses
 import hashlib
 from pathlib import Path
-from typing import Any
 
 import h5py
 import numpy as np
@@ -14,7 +13,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from memscal.apparatus import ApparatusFunction, load_apparatus
+from memscal.apparatus import load_apparatus
 from memscal.errors import FormatError, InputError, OutputError, UnitError
 from memscal.extensions.meshes.mesh_files import write_mesh
 from memscal.formats.artifact import write_artifact
@@ -29,7 +28,7 @@ from memscal.model.provenance import SourceFile
 pytestmark = pytest.mark.usefixtures("folder")
 
 
-def kept(**fields: Any) -> ApparatusFunction:
+def kept(**fields):
     """Write an artifact and read it."""
     write_artifact(make_artifact(**fields), "a.h5")
     return load_apparatus("a.h5")
@@ -205,7 +204,7 @@ def test_any_scan_comes_back(x, missing, title, notes, load):
     assert found.title == "".join(c for c in title if c.isprintable() or c in "\n\t")
 
 
-def other_program() -> None:
+def other_program():
     """Write a scan by the contract with h5py alone, in other units and other types."""
     with h5py.File("scan.h5", "w") as file:
         file.attrs["memscal_schema"] = "memscal-scan"

@@ -6,7 +6,6 @@ import sys
 import zipfile
 from datetime import date
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import openpyxl
@@ -26,7 +25,7 @@ X = [-8.0, 0.0, 8.0]
 U = [0.1, 2.0, 0.2]
 
 
-def workbook() -> str:
+def workbook():
     """A cover, and a sheet with a title, merged heads, units, a time stamp and an error."""
     book = openpyxl.Workbook()
     book.active.title = "Info"
@@ -58,7 +57,7 @@ def test_a_sheet_of_a_workbook_is_read_below_its_title_and_named_by_its_rows():
         imported(book, sheet="Data", x="x", u="U")
 
 
-def edited(change: Any) -> str:
+def edited(change):
     """A hidden sheet and a visible one of x and U, which a change turns into another."""
     book = openpyxl.Workbook()
     for sheet, factor in ((book.active, 9), (book.create_sheet("new"), 1)):
@@ -71,7 +70,7 @@ def edited(change: Any) -> str:
     return "a.xlsx"
 
 
-def hide(sheet: Any) -> None:
+def hide(sheet):
     sheet.auto_filter.ref = "A1:C4"
     for row in (2, 4):
         sheet.row_dimensions[row].hidden = True

@@ -3,8 +3,6 @@
 import subprocess
 import sys
 from dataclasses import replace
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -32,7 +30,7 @@ from memscal.readings.find_places import places_of
 COLUMNS = {"x": Wanted("x", "mm", "length"), "u": Wanted("u"), "n": Wanted("n", words=BRANCHES)}
 
 
-def content(path: Path, names: str, decimal: str, delimiter: str) -> Any:
+def content(path, names, decimal, delimiter):
     """Columns and notes of a table, or the words of its error."""
     try:
         table = TextTable(path, decimal=decimal, delimiter=delimiter)
@@ -87,7 +85,7 @@ def test_blocks_give_what_the_whole_table_gives(
             np.testing.assert_equal(found, whole)
 
 
-def big_table(path: Path, rows: int) -> Path:
+def big_table(path, rows):
     x = np.linspace(-8.0, 8.0, rows)
     lines = [f"{place:.6f},{np.exp(-place * place):.6f}" for place in x.tolist()]
     path.write_text("\n".join(["x/mm,u/mV", *lines]))
@@ -116,7 +114,7 @@ def test_a_million_rows_take_little_memory(tmp_path):
     """Ten arrays of 2.4 million bytes: text and cells are never held as a whole."""
     pytest.importorskip("resource")
 
-    def kilobytes(rows: int) -> int:
+    def kilobytes(rows):
         table = big_table(tmp_path / f"{rows}.csv", rows)
         command = [sys.executable, "-c", IMPORT, str(table)]
         peak = subprocess.run(command, capture_output=True, text=True, check=True).stdout
@@ -155,7 +153,7 @@ def test_a_head_is_looked_at_no_further_than_a_block(tmp_path, monkeypatch, line
     lines = TextTable._numbered
     monkeypatch.setattr(text_table, "_LONGEST", 2**18)
 
-    def watched(table: TextTable, block: bytes) -> Any:
+    def watched(table, block):
         assert len(block) <= 2 * text_table._LONGEST
         return lines(table, block)
 
@@ -193,7 +191,7 @@ def test_a_contact_of_too_many_points_does_nothing():
     assert memscal.restore(correlated, apparatus).points.u.size == 2001
 
 
-def went_on(*_: Any, **__: Any) -> None:
+def went_on(*_, **__):
     pytest.fail("it went on")
 
 
@@ -201,10 +199,10 @@ def test_a_comparison_of_too_many_points_does_nothing(monkeypatch):
     apparatus = made.known_apparatus()
     ones = np.ones(len(made.LOADS))
     none = dict.fromkeys(("u_zz_errors", "x_errors", "normal_load_errors"))
-    plain: Any = replace(made.contact_scan(), **none)
+    plain = replace(made.contact_scan(), **none)
     monkeypatch.setattr(compare_module, "measure_stress", went_on)
 
-    def refused(count: int, words: str, **options: Any) -> None:
+    def refused(count, words, **options):
         x = np.linspace(-5e-3, 5e-3, count)
         u = np.outer(ones, np.exp(-(x**2) / 1e-6))
         load = np.outer(made.LOADS, np.ones(count))
@@ -235,7 +233,7 @@ def test_a_file_of_too_many_points_is_refused_before_its_arrays_are_read(tmp_pat
     ],
 )
 def test_a_calibration_of_too_many_points_does_nothing(monkeypatch, limit, words):
-    scans: Any = [memscal.simulate(points=65, seed=seed) for seed in (1, 2)]
+    scans = [memscal.simulate(points=65, seed=seed) for seed in (1, 2)]
     if limit == "MOST_OF_RASTER":
         axis = np.linspace(-4e-3, 4e-3, 33)
         film = make_film()

@@ -3,7 +3,6 @@
 import gzip
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import h5py
 import numpy as np
@@ -45,7 +44,7 @@ SCANS = tuple(
 )
 
 
-def make_points(n: int, rng: np.random.Generator, channel: str) -> MeasuredPoints:
+def make_points(n, rng, channel):
     normal = channel == "zz"
     return MeasuredPoints(
         x=rng.normal(0, 1e-3, n),
@@ -60,12 +59,12 @@ def make_points(n: int, rng: np.random.Generator, channel: str) -> MeasuredPoint
     )
 
 
-def make_stress_profile(load: float, n: int = 7, **fields: Any) -> MeasuredProfile:
+def make_stress_profile(load, n=7, **fields):
     rng = np.random.default_rng(n)
     x = rng.uniform(-1e-3, 2e-3, n)
     r = np.sort(np.abs(x))
     root = rng.normal(size=(n, n))
-    made: dict[str, Any] = {
+    made = {
         "scan": SCANS[1],
         "load": load,
         "load_uncertainty": 0.01 * load,
@@ -90,9 +89,9 @@ def make_stress_profile(load: float, n: int = 7, **fields: Any) -> MeasuredProfi
     return MeasuredProfile(**(made | fields))
 
 
-def make_stress(**fields: Any) -> MeasuredStress:
+def make_stress(**fields):
     process = Process(program="memscal", version="1", date="", configuration={"override": True})
-    made: dict[str, Any] = {
+    made = {
         "profiles": (make_stress_profile(0.5, scan=SCANS[0]), make_stress_profile(1.5, 9)),
         "scans": SCANS,
         "conversion_constant": 1e-7 / 3,
@@ -110,13 +109,13 @@ def make_stress(**fields: Any) -> MeasuredStress:
 
 
 @pytest.fixture
-def path(folder: Path) -> Path:
+def path(folder):
     write_stress(make_stress(), "a.stress.h5")
     return folder / "a.stress.h5"
 
 
 @pytest.fixture
-def old(folder: Path) -> Path:
+def old(folder):
     """A file of version 1.0."""
     path = folder / "old.stress.h5"
     path.write_bytes(gzip.decompress((DATA / "stress_1_0.h5.gz").read_bytes()))

@@ -4,7 +4,6 @@ import hashlib
 import re
 import warnings
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -13,7 +12,7 @@ from helpers.tables import imported
 
 from memscal.errors import FormatError, InputError, UnitWarning
 from memscal.formats.tables.reference import read_reference_table
-from memscal.formats.tables.scan import ImportedScan, import_table
+from memscal.formats.tables.scan import import_table
 from memscal.formats.tables.stated import TableLayout
 from memscal.formats.tables.text_table import read_indenter_table
 from memscal.model.checks import marked_texts
@@ -23,7 +22,7 @@ from memscal.model.scan import Scan
 pytestmark = pytest.mark.usefixtures("folder")
 
 
-def scan_table(text: str, **options: Any) -> ImportedScan:
+def scan_table(text, **options):
     """Import a table with the usual options."""
     table = Path("table.csv")
     table.write_text(text, encoding="utf-8")
@@ -32,7 +31,7 @@ def scan_table(text: str, **options: Any) -> ImportedScan:
     return imported(table, **given)
 
 
-def rows(*columns: Any, header: str) -> str:
+def rows(*columns, header):
     """Write columns as text with full precision."""
     lines = [",".join(f"{v!r}" for v in row) for row in zip(*columns, strict=True)]
     return "\n".join([header, *lines])
@@ -316,7 +315,7 @@ def test_a_film_that_none_has_is_warned_of_with_the_unit_that_was_meant(changes,
         Scan(x=[0, 1e-3], u_zz=[0, 1], film=make_film(**changes))
 
 
-def reference_table(text: str, **options: Any) -> Any:
+def reference_table(text, **options):
     """Import a FEM table with the usual options."""
     table = Path("fem.csv")
     table.write_text(text)
@@ -369,7 +368,7 @@ def test_the_shear_sign_turns_the_stress_component_into_the_traction_on_the_film
     assert found.profile.sigma_zz[1] == pytest.approx(traction[2] * 1e6)
 
 
-def gaussian_table(reach: float, factor: float = 1.0) -> str:
+def gaussian_table(reach, factor=1.0):
     """1 N, with r in mm and s in MPa, up to a radius, on radii like those of a mesh."""
     r = reach * np.linspace(0.02, 1, 120) ** 1.5
     s = factor * np.exp(-(r**2) / 2) / (2 * np.pi)
@@ -470,7 +469,7 @@ def test_a_load_that_would_sink_the_indenter_through_the_film_is_refused(
 @pytest.mark.parametrize(("value", "load"), [(None, 1.0), (3.0, 3.0)])
 @pytest.mark.parametrize("unit", ["s (MPa)", "s"])
 def test_a_reference_without_a_load_is_scaled_by_its_own_integral(unit, value, load):
-    def read(reach: float, value: float | None) -> Any:
+    def read(reach, value):
         Path("p.csv").write_text(gaussian_table(reach).replace("r,s", f"r (mm),{unit}"))
         return read_reference_table("p.csv", r="r", sigma="s", value=value)
 

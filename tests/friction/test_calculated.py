@@ -3,7 +3,6 @@
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -20,26 +19,25 @@ from memscal.extensions.interface_laws.families import (
 )
 from memscal.friction.calculated import FRICTIONS, amontons_family
 from memscal.friction.family import FamilySetup, ProfileFamily
-from memscal.model.arrays import FloatArray
 
 LENGTHS = np.array([0.0, 0.25, 0.5, 1.0, 2.0, 4.0, 6.0, 8.0]) * 1.82e-6
 
 Build = Callable[[ElasticFilm, Sphere, list[float], list[float]], ProfileFamily]
 
 
-def amontons(**options: Any) -> Build:
+def amontons(**options):
     return lambda film, sphere, loads, values: amontons_family(
         film, sphere, loads, friction=values, reach=REACH, **options
     )
 
 
-def elasto_plastic(friction: float) -> Build:
+def elasto_plastic(friction):
     return lambda film, sphere, loads, values: elasto_plastic_family(
         film, sphere, loads, friction=friction, slip_lengths=values, reach=REACH
     )
 
 
-def normal() -> Build:
+def normal():
     return lambda film, sphere, loads, values: normal_compliance_family(
         film, sphere, loads, lengths=values, reach=REACH
     )
@@ -100,11 +98,11 @@ UNCERTAIN_FILM = replace(
 UNCERTAIN_SPHERE = replace(SPHERE, radius_uncertainty=0.01 * SPHERE.radius)
 
 
-def stress(family: ProfileFamily, spectra: FloatArray) -> FloatArray:
+def stress(family, spectra):
     return profiles(family, spectra, blurred=False)[0]
 
 
-def with_a_changed(source: str, share: float) -> tuple[ElasticFilm, Sphere]:
+def with_a_changed(source, share):
     """The film and the sphere with one property larger by a share of itself."""
     if source == "indenter_radius":
         return FILM, replace(SPHERE, radius=SPHERE.radius * (1 + share))
@@ -157,7 +155,7 @@ def test_whatever_changes_the_base_still_bears_the_load():
     family = amontons_family(UNCERTAIN_FILM, UNCERTAIN_SPHERE, LOADS, friction=[0.2], reach=REACH)
     squared = family.wavenumbers.k[:3] ** 2
 
-    def force(spectra: FloatArray) -> FloatArray:
+    def force(spectra):
         return np.polynomial.polynomial.polyfit(squared, spectra[:, :3].T, 2)[0]
 
     np.testing.assert_allclose(force(family.spectra[0]), LOADS, rtol=1e-6)

@@ -2,17 +2,14 @@
 
 import math
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 import memscal
-from memscal import Experiment, Scan
 from memscal.errors import InputError
 from memscal.friction.calculated import amontons_family
 from memscal.friction.compare import compare_measured
-from memscal.friction.family import ProfileFamily
 from memscal.friction.likelihood import load_points, points_of, predict, sensor_of
 
 FRICTION = (0.0, 0.1, 0.2, 0.3, math.inf)
@@ -20,24 +17,22 @@ TRUTH = 0.2
 
 
 @pytest.fixture(scope="module")
-def made() -> Experiment:
+def made():
     return memscal.simulate_experiment(friction=TRUTH, loads=[0.69, 2.75], seed=11)
 
 
 @pytest.fixture(scope="module")
-def apparatus(made: Experiment) -> memscal.ApparatusFunction:
+def apparatus(made):
     return memscal.calibrate(made.rod, method="evidence").apparatus
 
 
 @pytest.fixture(scope="module")
-def kept(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def kept(tmp_path_factory):
     return tmp_path_factory.mktemp("contacts")
 
 
 @pytest.fixture(scope="module")
-def found(
-    made: Experiment, apparatus: memscal.ApparatusFunction, kept: Path
-) -> memscal.FrictionComparison:
+def found(made, apparatus, kept):
     return memscal.compare(
         [made.dry, made.lubricated],
         apparatus,
@@ -50,7 +45,7 @@ def found(
 
 
 @pytest.fixture(scope="module")
-def families(made: Experiment, kept: Path) -> dict[str, ProfileFamily]:
+def families(made, kept):
     """The contacts of the comparison, from its folder."""
     family = amontons_family(
         made.dry.film, made.dry.indenter, [0.69, 2.75], friction=FRICTION, reach=24e-3, cache=kept
@@ -58,11 +53,11 @@ def families(made: Experiment, kept: Path) -> dict[str, ProfileFamily]:
     return {"incremental": family}
 
 
-def scaled(scan: Scan, factor: float, noise: float = 1.0) -> Scan:
+def scaled(scan, factor, noise=1.0):
     return replace(scan, u_zz=factor * scan.u_zz, u_zz_errors=noise * scan.u_zz_errors)
 
 
-def failed(found: memscal.FrictionComparison) -> set[str]:
+def failed(found):
     return {check.name for check in found.checks if not check.passed}
 
 
@@ -104,13 +99,13 @@ def test_noise_that_is_understated_fails_the_chi_square(made, apparatus, familie
     assert found.joint["dry"]["incremental"].p_value < 1e-6
 
 
-def over_a_plane(made: Experiment) -> Scan:
+def over_a_plane(made):
     axis = np.linspace(-5e-3, 5e-3, 9)
     u = np.exp(-np.add.outer(axis**2, axis**2) / 2e-6)
     return replace(made.rod, x=axis, y=axis, u_zz=u, u_zz_errors=None, indenter=made.dry.indenter)
 
 
-def on_another_film(made: Experiment) -> list[Scan]:
+def on_another_film(made):
     film = replace(made.dry.film, young_modulus=2.3e6)
     return [made.lubricated, replace(made.dry, film=film)]
 
@@ -170,8 +165,8 @@ def test_how_far_lubricated_friction_moves_the_dry_coefficient(
 ):
     measured = memscal.measure_stress([made.dry, made.lubricated], apparatus)
 
-    def estimate(at: float) -> memscal.BoundedEstimate:
-        def one_value(values: np.ndarray, _: float) -> np.ndarray:
+    def estimate(at):
+        def one_value(values, _):
             return np.eye(values.size)[np.abs(values - at).argmin()]
 
         monkeypatch.setattr("memscal.friction.effective.half_normal_weights", one_value)

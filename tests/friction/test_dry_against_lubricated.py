@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -11,15 +10,14 @@ from helpers.linear_contacts import CONVERSION, Laboratory, bare_points
 from scipy.stats import kstest
 
 from memscal.friction.dry_against_lubricated import dry_against_lubricated, lubricated_pairs
-from memscal.friction.likelihood import Channel, LoadPoints
-from memscal.friction.results import DryAgainstLubricated
+from memscal.friction.likelihood import Channel
 
 CHANCE = 1e-4
 PAIRS = 60 if FULL else 30
 LOAD = 1
 
 
-def profile(points: LoadPoints, lubrication: str, load: float = 2.0) -> Any:
+def profile(points, lubrication, load=2.0):
     """What a comparison reads of a measured profile."""
     stress = points.u / CONVERSION
     noise = points.noise / CONVERSION
@@ -37,9 +35,7 @@ def profile(points: LoadPoints, lubrication: str, load: float = 2.0) -> Any:
     )
 
 
-def compared(
-    friction: float, seed: int, *, correlation: float = 0.0, shift: float = 0.0
-) -> DryAgainstLubricated | None:
+def compared(friction, seed, *, correlation=0.0, shift=0.0):
     laboratory = Laboratory.of(points=bare_points(correlation=correlation))
     dry = laboratory.measured(friction, 2 * seed, systematic=False)[LOAD]
     wet = laboratory.measured(0.0, 2 * seed + 1, systematic=False)[LOAD]
@@ -49,7 +45,7 @@ def compared(
         moved = after - before
         wet = replace(there, u=wet.u + moved[0])
     frictionless = laboratory.family.at(0.0).only([LOAD, LOAD])
-    measured: Any = SimpleNamespace(
+    measured = SimpleNamespace(
         profiles=(profile(dry, "dry"), profile(wet, "lubricated")),
         conversion_constant=CONVERSION,
         conversion_constant_uncertainty=0.01 * CONVERSION,
@@ -59,7 +55,7 @@ def compared(
     )
 
 
-def every(friction: float, **options: float) -> list[DryAgainstLubricated]:
+def every(friction, **options):
     found = [compared(friction, seed, **options) for seed in range(PAIRS)]
     return [one for one in found if one is not None]
 

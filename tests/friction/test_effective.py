@@ -9,7 +9,6 @@ from helpers.linear_contacts import Laboratory
 from scipy.stats import binom, kstest
 
 from memscal.friction.effective import with_loading
-from memscal.friction.results import BoundedEstimate
 
 SEEDS = 40 if FULL else 20
 CHANCE = 1e-4
@@ -17,12 +16,12 @@ TRUTHS = (0.0, 0.1, 0.2, 0.3)
 
 
 @lru_cache
-def laboratory() -> Laboratory:
+def laboratory():
     return Laboratory.of()
 
 
 @lru_cache
-def found(friction: float) -> list[BoundedEstimate]:
+def found(friction):
     first = 1000 * round(100 * min(friction, 9.0))
     return [laboratory().drawn(friction, first + seed).coefficient([0, 1]) for seed in range(SEEDS)]
 

@@ -11,7 +11,7 @@ from helpers.calculated_cases import LOADS, REACH, apart
 from helpers.machine import assert_same_to_rounding
 from helpers.paper import SPHERE
 
-from memscal import StressProfile, indent
+from memscal import indent
 from memscal.errors import InputError
 from memscal.friction.calculated import amontons_family, external_family
 
@@ -21,7 +21,7 @@ CONTACT = {"film": FILM, "indenter": SPHERE, "reach": REACH}
 
 
 @cache
-def tables() -> list[StressProfile]:
+def tables():
     return [
         replace(contact.profile(), loading="incremental")
         for mu in FRICTIONS

@@ -16,12 +16,12 @@ LOADS = np.array([0.5, 1.0])
 NODES = Wavenumbers.covering(1e3, 1e-2)
 
 
-def saturating(value: float) -> float:
+def saturating(value):
     """A quantity that rises and levels off, as a stress does with friction."""
     return 1 - math.exp(-6 * value) if math.isfinite(value) else 1.0
 
 
-def family() -> ProfileFamily:
+def family():
     rise = np.array([saturating(value) for value in VALUES])
     spectra = (1 + 0.2 * rise)[:, None, None] * LOADS[:, None] * np.exp(-((NODES.k * 1e-3) ** 2))
     number = np.ones((VALUES.size, LOADS.size))

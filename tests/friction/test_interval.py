@@ -4,17 +4,15 @@ import numpy as np
 import pytest
 
 from memscal.friction.interval import friction_reason, profile_estimate
-from memscal.friction.results import BoundedEstimate
-from memscal.model.arrays import FloatArray
 
 COORDINATES = np.linspace(0.0, 1.0, 101)
 
 
-def value_at(t: float) -> float:
+def value_at(t):
     return float("inf") if t == 1 else 0.3 * t / (1 - t)
 
 
-def estimate(chi_square: FloatArray, last: float = np.inf) -> BoundedEstimate:
+def estimate(chi_square, last=np.inf):
     return profile_estimate(
         np.array([value_at(t) for t in COORDINATES]),
         COORDINATES,
@@ -25,7 +23,7 @@ def estimate(chi_square: FloatArray, last: float = np.inf) -> BoundedEstimate:
     )
 
 
-def parabola(best: float, sigma: float, last: float = np.inf) -> BoundedEstimate:
+def parabola(best, sigma, last=np.inf):
     return estimate(7.0 + ((COORDINATES - best) / sigma) ** 2, last)
 
 

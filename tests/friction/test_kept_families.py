@@ -1,7 +1,6 @@
 """Families that are kept in a folder: the same numbers, for the same request only."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 from helpers.calculated_cases import REACH
@@ -9,22 +8,21 @@ from helpers.paper import FILM, SPHERE
 from helpers.records import assert_same
 
 from memscal.friction.calculated import amontons_family
-from memscal.friction.family import FamilySetup, ProfileFamily
-from memscal.model.film import ElasticFilm
+from memscal.friction.family import FamilySetup
 
 
-def calculated(cache: Path | None, film: ElasticFilm = FILM, **changed: object) -> ProfileFamily:
+def calculated(cache, film=FILM, **changed):
     request = {"friction": [0.0, 0.3], "loading": "incremental", "reach": REACH} | changed
     return amontons_family(film, SPHERE, [0.34], cache=cache, **request)
 
 
 @pytest.fixture
-def solved(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+def solved(monkeypatch):
     """How many groups of paths each call solved."""
-    counts: list[int] = []
+    counts = []
     solve = FamilySetup._solved
 
-    def counted(setup: FamilySetup, groups: list[object]) -> object:
+    def counted(setup, groups):
         counts.append(len(groups))
         return solve(setup, groups)
 

@@ -7,19 +7,18 @@ import pytest
 from helpers.bounds import FULL
 from helpers.linear_contacts import FRICTIONS, Laboratory, bare_points
 
-from memscal.friction.effective import FrictionFit
 from memscal.friction.family import bounded, unbounded
-from memscal.friction.likelihood import LoadPoints, Predicted, likelihood, predict
+from memscal.friction.likelihood import likelihood, predict
 
 CORRELATED = {"white": 0.0, "correlated": 0.6}
 
 
 @pytest.fixture(params=CORRELATED)
-def laboratory(request: pytest.FixtureRequest) -> Laboratory:
+def laboratory(request):
     return Laboratory.of(points=bare_points(correlation=CORRELATED[request.param]))
 
 
-def dense(found: FrictionFit, value: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def dense(found, value):
     """Residual, covariance without flat parameters, and flat columns, over all loads."""
     predicted = predicted_of(found, value)
     measured = found.channel.points
@@ -45,11 +44,11 @@ def dense(found: FrictionFit, value: float) -> tuple[np.ndarray, np.ndarray, np.
     return residual, noise + shared @ shared.T, flat
 
 
-def joined(found: Predicted) -> np.ndarray:
+def joined(found):
     return np.concatenate([column[0] for column in found.columns.values()], axis=1)
 
 
-def generalised(residual: np.ndarray, covariance: np.ndarray, flat: np.ndarray) -> float:
+def generalised(residual, covariance, flat):
     """Chi-square of generalised least squares: by its normal equations."""
     inverse = np.linalg.inv(covariance)
     columns = flat / np.abs(flat).max(axis=0)
@@ -66,7 +65,7 @@ def test_chi_square_is_that_of_generalised_least_squares(laboratory):
         assert whole[i] == pytest.approx(generalised(*dense(found, value)), rel=1e-6)
 
 
-def without_the_last_reading(points: LoadPoints) -> LoadPoints:
+def without_the_last_reading(points):
     """Points of repeats that are not complete."""
     arrays = {k: v[:-1] for k, v in vars(points).items() if np.shape(v)[:1] == points.u.shape}
     return replace(points, **arrays)
@@ -158,7 +157,7 @@ def test_a_load_that_is_held_shares_its_errors_with_the_others(laboratory):
     assert together.slope_fit()[0][30] > found.whole.only([0]).slope_fit()[0][30]
 
 
-def predicted_of(found: FrictionFit, value: float) -> list[Predicted]:
+def predicted_of(found, value):
     channel = found.channel.at(value)
     return [
         predict(points, channel.sensor, channel.family, load)

@@ -10,14 +10,12 @@ from helpers.scans import simulate, simulate_contacts, simulate_experiment
 from scipy.stats import chi2
 
 import memscal
-from memscal import ApparatusFunction, Experiment, LoadCell, MeasuredStress
+from memscal import LoadCell
 from memscal.extensions.simulation.contact_scan import PAPER_SPHERE
 from memscal.extensions.simulation.rod_scan import PAPER_FILM
 from memscal.friction.calculated import amontons_family
-from memscal.friction.family import ProfileFamily
-from memscal.friction.likelihood import Predicted, load_points, points_at, predict, sensor_of
+from memscal.friction.likelihood import load_points, points_at, predict, sensor_of
 from memscal.measurement.measure_stress import pooled_force
-from memscal.model.arrays import FloatArray
 
 SEEDS = range(8 if FULL else 4)
 CHANCE = 1e-3
@@ -30,7 +28,7 @@ OFFSETS = np.linspace(-6e-3, 6e-3, 25)
 
 
 @lru_cache
-def experiment(seed: int) -> Experiment:
+def experiment(seed):
     """Scans of one load cell, whose error is drawn with everything else."""
     return simulate_experiment(
         film=FILM,
@@ -45,7 +43,7 @@ def experiment(seed: int) -> Experiment:
 
 
 @lru_cache
-def measured(seed: int, other: LoadCell | None = None) -> tuple[MeasuredStress, ApparatusFunction]:
+def measured(seed, other=None):
     """Dry contacts and their sensor, which may name another load cell."""
     made = experiment(seed)
     sensor = memscal.calibrate(made.rod, method="evidence").apparatus
@@ -54,7 +52,7 @@ def measured(seed: int, other: LoadCell | None = None) -> tuple[MeasuredStress, 
 
 
 @lru_cache
-def family() -> ProfileFamily:
+def family():
     values = (0.0, 0.05, 0.1, 0.15, 0.2, 0.3, 1.0)
     return amontons_family(FILM, PAPER_SPHERE, LOADS, friction=values, reach=24e-3)
 
@@ -82,7 +80,7 @@ def test_scans_of_two_load_cells_calibrate_a_sensor_of_none():
         assert memscal.calibrate(scans, method="evidence").apparatus.load_cell.name == named
 
 
-def force_of(rod_scale: float, sphere_scale: float) -> tuple[float, float]:
+def force_of(rod_scale, sphere_scale):
     """Force less load, and what the check allows, by true loads over the stated; in N."""
     cell = {"load_cell": LoadCell(name="K")}
     rod = simulate(film=FILM, load=rod_scale, load_uncertainty=SHARE)
@@ -138,7 +136,7 @@ def test_the_force_over_load_has_the_error_that_it_states():
     assert min(apart) > 3 * pooled_force(measured(0)[0].profiles)[1]
 
 
-def predicted(other: LoadCell | None = None) -> Predicted:
+def predicted(other=None):
     stress, sensor = measured(0, other)
     sensed = sensor_of(sensor, family(), 8e-3, stress.scans)
     return predict(
@@ -161,7 +159,7 @@ def test_its_error_changes_a_and_the_contact_as_one():
         one.columns["load"], SHARE * softer, atol=1e-2 * signal.max() * SHARE
     )
 
-    def variance(found: Predicted) -> FloatArray:
+    def variance(found):
         return sum(np.sum(column[0] ** 2, axis=1) for column in found.columns.values())
 
     crossed = -2 * SHARE**2 * by_load * signal

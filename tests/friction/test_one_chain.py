@@ -7,10 +7,8 @@ import numpy as np
 import pytest
 
 import memscal
-from memscal import ApparatusFunction, Experiment
 from memscal.friction.calculated import amontons_family
-from memscal.friction.family import ProfileFamily
-from memscal.friction.likelihood import Predicted, points_of, predict, sensor_of
+from memscal.friction.likelihood import points_of, predict, sensor_of
 from memscal.model.instrument import Equipment
 
 LOAD = 2.75
@@ -19,18 +17,18 @@ STAGE = Equipment(name="stage", serial_number="7")
 
 
 @lru_cache
-def made() -> Experiment:
+def made():
     return memscal.simulate_experiment(friction=0.1, loads=[LOAD], lubricated_loads=[LOAD], seed=3)
 
 
 @lru_cache
-def family() -> ProfileFamily:
+def family():
     scan = made().dry
     return amontons_family(scan.film, scan.indenter, [LOAD], friction=(0.0, 0.1), reach=24e-3)
 
 
 @lru_cache
-def calibrated(stretch: float = 1.0) -> ApparatusFunction:
+def calibrated(stretch=1.0):
     rod = replace(
         made().rod,
         x=stretch * made().rod.x,
@@ -42,7 +40,7 @@ def calibrated(stretch: float = 1.0) -> ApparatusFunction:
 
 
 @lru_cache
-def measured(stage: Equipment, gain: float | None = None) -> memscal.MeasuredStress:
+def measured(stage, gain=None):
     dry = replace(
         made().dry,
         stage=stage,
@@ -52,7 +50,7 @@ def measured(stage: Equipment, gain: float | None = None) -> memscal.MeasuredStr
     return memscal.measure_stress(dry, calibrated())
 
 
-def predicted(stage: Equipment, gain: float | None = None, stretch: float = 1.0) -> Predicted:
+def predicted(stage, gain=None, stretch=1.0):
     contact = measured(stage, gain)
     sensor = sensor_of(calibrated(stretch), family(), 8e-3, contact.scans)
     readings = points_of(contact.profiles)[0]

@@ -5,10 +5,8 @@ of 75 %.
 """
 
 import math
-from collections.abc import Iterator
 from dataclasses import replace
 from functools import lru_cache
-from pathlib import Path
 
 import h5py
 import numpy as np
@@ -20,7 +18,7 @@ from scipy.linalg import block_diag
 from scipy.stats import binom
 
 import memscal
-from memscal import ApparatusFunction, Experiment, GaussianMixture, MeasuredStress, compare
+from memscal import GaussianMixture, compare
 from memscal.errors import FormatError, InputError
 from memscal.friction.calculated import amontons_family
 from memscal.friction.likelihood import (
@@ -31,9 +29,7 @@ from memscal.friction.likelihood import (
     predict,
     sensor_of,
 )
-from memscal.friction.results import Interval
 from memscal.measurement.posterior import common_inputs
-from memscal.model.arrays import FloatArray
 
 EXPERIMENTS = 80 if FULL else 4
 TRUTHS = (0.0, 0.1, 0.2, 1.0)
@@ -42,12 +38,12 @@ LOADS = (0.69, 2.75)
 KERNEL = GaussianMixture(sigmas=(400e-6,))
 
 
-def width(interval: Interval) -> float:
+def width(interval):
     return (math.inf if interval.high is None else interval.high) - interval.low
 
 
 @lru_cache
-def experiment(friction: float, seed: int) -> Experiment:
+def experiment(friction, seed):
     return simulate_experiment(
         friction=friction,
         loads=LOADS,
@@ -59,7 +55,7 @@ def experiment(friction: float, seed: int) -> Experiment:
 
 
 @lru_cache
-def calibrated(seed: int) -> tuple[ApparatusFunction, ApparatusFunction]:
+def calibrated(seed):
     # The rod's scan does not depend on the sphere's friction.
     rod = experiment(TRUTHS[seed % len(TRUTHS)], seed).rod
     normal, shear = (
@@ -70,12 +66,12 @@ def calibrated(seed: int) -> tuple[ApparatusFunction, ApparatusFunction]:
 
 
 @lru_cache
-def measured(friction: float, seed: int) -> MeasuredStress:
+def measured(friction, seed):
     return memscal.measure_stress(experiment(friction, seed).dry, calibrated(seed)[0])
 
 
 @pytest.fixture(scope="module")
-def cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+def cache(tmp_path_factory):
     """Contacts that the tests of this module calculate once."""
     return tmp_path_factory.mktemp("contacts")
 
@@ -89,7 +85,7 @@ def test_what_is_predicted_has_a_side_and_slopes_of_its_own():
     sensor = sensor_of(shear, family, 8e-3, [dry])
     members = family.at(0.1)
 
-    def at(offset: FloatArray) -> LoadPoints:
+    def at(offset):
         nothing = np.zeros_like(offset)
         flat = np.ones((offset.size, 1))
         return LoadPoints(nothing, offset, nothing, nothing, nothing, nothing, flat)

@@ -12,26 +12,26 @@ import memscal
 class Answers(Adapter):
     """A connection whose other end is a function of commands."""
 
-    def __init__(self, does: Callable[[str], str | None]) -> None:
+    def __init__(self, does: Callable[[str], str | None]):
         super().__init__()
         self.does = does
 
-    def _write(self, command: str, **_: object) -> None:
+    def _write(self, command: str, **_):
         self.answer = self.does(command)
 
-    def _read(self, **_: object) -> str:
+    def _read(self, **_) -> str:
         return self.answer
 
 
 class Bench:
     """A rod over a simulated sensor: readings lie on a scan, with noise (V), where it rests."""
 
-    def __init__(self, scan: memscal.Scan, *, noise: float, seed: int) -> None:
+    def __init__(self, scan: memscal.Scan, *, noise: float, seed: int):
         self.scan = scan
         self.noise = noise
         self.random = np.random.default_rng(seed)
         self.position = {"1": 0.0, "2": 1.0}  # mm, across and up
-        self.enabled: set[str] = set()
+        self.enabled = set()
         self.readings = self.dragged = 0
         self.stage = Answers(self.move)
         self.voltmeter = Answers(self.read)

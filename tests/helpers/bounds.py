@@ -3,7 +3,6 @@
 import os
 from dataclasses import replace
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 from helpers.scans import CENTRE, CONVERSION, EXACT_FILM, GAUSSIAN, simulated
@@ -11,7 +10,6 @@ from scipy.stats import chi2
 
 import memscal
 from memscal.model.apparatus import ParameterSet
-from memscal.model.arrays import FloatArray
 
 FULL = bool(os.environ.get("MEMSCAL_FULL_STUDY"))
 """Whether studies run over all their seeds and on their finest meshes."""
@@ -31,9 +29,9 @@ def cramer_rao(
     noise: float,
     kernel: memscal.GaussianMixture = GAUSSIAN,
     *,
-    centre: tuple[float, float] = (CENTRE, 0.0),
-    inexact: bool = False,
-    **setting: Any,
+    centre=(CENTRE, 0.0),
+    inexact=False,
+    **setting,
 ) -> dict[str, float]:
     """Cramer-Rao bounds of A, sigma, centre and baseline, all unknown, in SI units.
 
@@ -45,7 +43,7 @@ def cramer_rao(
     names = ("conversion_constant", "gaussian_sigma", "centre", "centre_y")
     steps = dict(zip(names, (1e-4 * CONVERSION, 1e-4 * width, 0.01e-3, 0.01e-3), strict=True))
 
-    def voltage(name: str = "", change: float = 0.0, **other: Any) -> FloatArray:
+    def voltage(name="", change=0.0, **other):
         a, s, x, y = np.array([CONVERSION, width, *centre]) + change * (np.array(names) == name)
         sigmas = tuple(sigma * s / width for sigma in kernel.sigmas)
         return simulated(
@@ -89,7 +87,7 @@ WIDEST = {"conversion_constant": 4.0, "baseline": 1.6}
 """Largest uncertainties over their bounds: a free G, and a drift, cost A and the baseline more."""
 
 
-def assert_as_stated(parameters: ParameterSet, truths: Any, bounds: dict[str, float]) -> None:
+def assert_as_stated(parameters: ParameterSet, truths, bounds: dict[str, float]):
     """Assert that the truth is within four uncertainties, and these are at their bounds."""
     for name, bound in bounds.items():
         u = parameters.uncertainty(name)

@@ -1,7 +1,6 @@
 """Small self-consistent objects that many tests need."""
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -22,7 +21,7 @@ SIGMA = 561e-6
 CONVERSION = 3.0e-8
 
 
-BARE: dict[str, Any] = {
+BARE = {
     **dict.fromkeys(("u_zz_errors", "normal_load", "load_uncertainty", "reference", "synthetic")),
     **dict.fromkeys(("title", "start_time", "end_time", "notes"), ""),
     "channels": {},
@@ -33,7 +32,7 @@ BARE: dict[str, Any] = {
 """Changes that leave a scan without all that is optional."""
 
 
-def make_film(**changes: Any) -> ElasticFilm:
+def make_film(**changes) -> ElasticFilm:
     """The paper's film."""
     film = ElasticFilm(
         young_modulus=2.2e6,
@@ -48,7 +47,7 @@ def make_film(**changes: Any) -> ElasticFilm:
     return replace(film, **changes)
 
 
-def make_profile(**changes: Any) -> StressProfile:
+def make_profile(**changes) -> StressProfile:
     """A Gaussian stress that carries 1 N."""
     r = np.linspace(0.0, 10e-3, 101)
     width = 1.0e-3
@@ -72,7 +71,7 @@ def make_profile(**changes: Any) -> StressProfile:
     return replace(profile, **changes)
 
 
-def make_scan(kind: str = "line", **changes: Any) -> Scan:
+def make_scan(kind="line", **changes) -> Scan:
     """A Gaussian response: a line, repeats, a raster or points; with a missing point."""
     x = np.linspace(-8e-3, 8e-3, 33)
     y = np.linspace(-4e-3, 4e-3, 9)
@@ -121,7 +120,7 @@ def make_scan(kind: str = "line", **changes: Any) -> Scan:
     return replace(scan, **changes)
 
 
-def make_artifact(**changes: Any) -> ApparatusData:
+def make_artifact(**changes) -> ApparatusData:
     """A Gaussian apparatus function of 561 um in all its views."""
     x = np.linspace(-4e-3, 4e-3, 33)
     y = np.linspace(-3e-3, 3e-3, 25)
@@ -181,7 +180,7 @@ def make_artifact(**changes: Any) -> ApparatusData:
     return replace(data, **changes)
 
 
-def scan_points(scan: Reconvolution, chosen: Any) -> Reconvolution:
+def scan_points(scan: Reconvolution, chosen) -> Reconvolution:
     """Return the points with these numbers."""
     return replace(scan, **{n: v[chosen] for n, v in vars(scan).items() if v is not None})
 

@@ -146,7 +146,7 @@ def run(deck: list[str], folder: Path) -> dict[tuple[str, float], dict[int, Floa
 
 def parse(printed: str) -> dict[tuple[str, float], dict[int, FloatArray]]:
     """Tables of a .dat file by the set of nodes and the time; each has components by node."""
-    tables: dict[tuple[str, float], dict[int, FloatArray]] = {}
+    tables = {}
     for line in printed.splitlines():
         heading = re.search(r"for set (\S+) and time\s+(\S+)", line)
         if heading:

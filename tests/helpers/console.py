@@ -24,7 +24,7 @@ class Outcome:
     def json(self) -> dict[str, Any]:
         """Standard output as the one object that it must be, in standard JSON."""
 
-        def refuse(constant: str) -> None:
+        def refuse(constant):
             raise AssertionError(f"{constant} is not JSON")
 
         value = json.loads(self.out, parse_constant=refuse)

@@ -13,7 +13,6 @@ the inner integral is the same for all G, the outer one has panels narrower than
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 from helpers.scans import CENTRE, CONVERSION, EXACT_FILM, EXACT_ROD, SENSOR
@@ -91,7 +90,7 @@ def mean_stress(points: int, centre: float, load: float, radius: float, law: str
 
 
 @lru_cache
-def voltages(kernel: Kernel, points: int, centre: float, *pressed: Any) -> FloatArray:
+def voltages(kernel: Kernel, points: int, centre: float, *pressed) -> FloatArray:
     """Voltages without noise, baseline and drift, in V; load, rod and law as of mean_stress."""
     q, weights = quadrature()
     share = weights * kernel.radial(q)
@@ -104,16 +103,16 @@ def direct_scan(
     kernel: Kernel,
     *,
     noise: float,
-    seed: int = 0,
-    points: int = 65,
-    repeats: int = 1,
+    seed=0,
+    points=65,
+    repeats=1,
     centre: float = CENTRE,
-    baseline: float = 0.01,
-    drift: float = 0.005,
-    state_noise: bool = True,
-    load: float = 1.0,
+    baseline=0.01,
+    drift=0.005,
+    state_noise=True,
+    load=1.0,
     radius: float = EXACT_ROD.radius,
-    law: str = "linear",
+    law="linear",
 ) -> memscal.Scan:
     """Scan as ``memscal.simulate`` does, with the same noise for a seed, by direct convolution.
 

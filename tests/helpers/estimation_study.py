@@ -80,7 +80,7 @@ GOALS = {
 }
 """What is asked of a kind of kernel; the tables say where it does not hold."""
 
-SMOOTHED: dict[str, Any] = {
+SMOOTHED = {
     "error": (0.14, 0.14, 0.20),
     "beyond": 0.15,
     "bias_g": 2.3,
@@ -89,7 +89,7 @@ SMOOTHED: dict[str, Any] = {
     "bias_a": 0.6,
     "z_fwhm": (0.15, 1.36),
 }
-EXCEPTIONS: dict[str, dict[str, Any]] = {
+EXCEPTIONS = {
     # The band counts what the scan does not exclude, and a Gaussian has none of it; in a few draws
     # the noise resembles another shape.
     "Gaussian": {"beyond": 0.10, "ratio": (0.04, 1.36), "z_a": (0.4, 1.2), "z_fwhm": (0.06, 1.36)},
@@ -254,7 +254,7 @@ def _gaussian(sigma: float) -> tuple[str, Kernel]:
     return f"Gaussian {sigma:g}", memscal.GaussianMixture((1.0,), (sigma * 1e-3,))
 
 
-def _disc(radius: float, sigma: float, kind: str = "disc") -> tuple[str, Kernel]:
+def _disc(radius: float, sigma: float, kind="disc") -> tuple[str, Kernel]:
     disc = memscal.SmoothedDisc(radius=radius * 1e-3, sigma=sigma * 1e-3)
     return f"{kind} {radius:g}/{sigma:g}", disc
 

@@ -21,7 +21,7 @@ _ONE_SIGMA = 1.0
 _COMMON = 0.008  # relative uncertainty of all stresses together
 
 
-def stress(r: Any, load: float, friction: float, loading: str) -> Any:
+def stress(r, load: float, friction: float, loading: str):
     """Return a Gaussian of the load's force, which narrows as friction grows; in Pa."""
     p0 = np.interp(load, LOADS, _MAXIMA)
     top = p0 * (1 + np.interp(load, LOADS, _GAINS[loading]) * (1.0 - math.exp(-friction / 0.12)))
@@ -29,7 +29,7 @@ def stress(r: Any, load: float, friction: float, loading: str) -> Any:
 
 
 def reading(
-    values: np.ndarray, chi_square: np.ndarray, *, degrees: int = 29, **fields: Any
+    values: np.ndarray, chi_square: np.ndarray, *, degrees=29, **fields
 ) -> memscal.BoundedEstimate:
     """Return what a profile likelihood says, by the rule of the package."""
     least = float(chi_square.min())
@@ -53,7 +53,7 @@ def reading(
     )
 
 
-def measured_profile(load: float, lubrication: str, friction: float, rng: Any) -> Any:
+def measured_profile(load: float, lubrication: str, friction: float, rng):
     """Return a stand-in of a measured profile: what tables and figures read of one."""
     x = np.linspace(-8e-3, 8e-3, 33) - 0.14e-3
     x = x[np.argsort(np.abs(x))]
@@ -77,7 +77,7 @@ def measured_profile(load: float, lubrication: str, friction: float, rng: Any) -
     )
 
 
-def _scan(lubrication: str) -> Any:
+def _scan(lubrication: str):
     source = memscal.SourceFile(f"{lubrication or 'sphere'}.h5", "ef" * 32)
     return SimpleNamespace(
         source=source,
@@ -88,14 +88,14 @@ def _scan(lubrication: str) -> Any:
     )
 
 
-def load_comparison(profile: Any, loading: str) -> memscal.LoadComparison:
+def load_comparison(profile, loading: str) -> memscal.LoadComparison:
     """Compare one profile with the closed form."""
     fine = np.concatenate([np.linspace(0.0, 0.6, 301), np.geomspace(0.62, 30, 40), [math.inf]])
     load = profile.load
     r = profile.r
     common = _COMMON * profile.s_zz.max()
 
-    def misfit(mu: float) -> float:
+    def misfit(mu):
         z = (profile.s_zz - stress(r, load, mu, loading)) / np.hypot(profile.s_zz_errors, common)
         return float(z @ z)
 
@@ -130,12 +130,12 @@ def load_comparison(profile: Any, loading: str) -> memscal.LoadComparison:
 
 def comparison(
     *,
-    friction: float = 0.15,
-    lubrications: Sequence[str] = ("dry", "lubricated"),
-    loadings: Sequence[str] = ("incremental", "total"),
-    failed: bool = False,
+    friction=0.15,
+    lubrications=("dry", "lubricated"),
+    loadings=("incremental", "total"),
+    failed=False,
     loads: Sequence[float] = LOADS,
-    **fields: Any,
+    **fields,
 ) -> memscal.FrictionComparison:
     """Return a comparison of every load, dry and lubricated."""
     rng = np.random.default_rng(1)
@@ -166,7 +166,7 @@ def comparison(
         artifact=None,
         process=memscal.Process(program="memscal", version="0", date=""),
     )
-    given: dict[str, Any] = {
+    given = {
         "measured": measured,
         "friction": FRICTION,
         "loads": by_loading,
@@ -179,7 +179,7 @@ def comparison(
     return memscal.FrictionComparison(**(given | fields))
 
 
-def interface_comparison(slip_length: float = 1.8e-6) -> memscal.InterfaceComparison:
+def interface_comparison(slip_length=1.8e-6) -> memscal.InterfaceComparison:
     """Return laws of a dry and of a lubricated interface, a slip length preferred."""
     pressures = np.array([27e3, 33e3, 50e3, 80e3])
     friction = np.outer([0.11, 0.14, 0.17, 0.2], [1.3, 1.0, 0.8])
@@ -193,7 +193,7 @@ def interface_comparison(slip_length: float = 1.8e-6) -> memscal.InterfaceCompar
     return memscal.InterfaceComparison((1.6, 0.2), tangential, normal, messages)
 
 
-def _laws(lubrication: str, names: Any, evidence: Any, length: float, implied: Any) -> Any:
+def _laws(lubrication: str, names, evidence, length: float, implied):
     lengths = np.concatenate([[0.0], np.geomspace(0.05e-6, 50e-6, 120), [math.inf]])
     bounded = np.where(np.isinf(lengths), 20.0, np.log1p(lengths / 1e-6) / 0.1)
     chi_square = (bounded - math.log1p(length / 1e-6) / 0.1) ** 2 + 120.0

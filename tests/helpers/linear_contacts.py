@@ -49,7 +49,7 @@ def gaussian_sensor() -> Sensor:
     return Sensor(NODES, CONVERSION * g, changes, CONVERSION)
 
 
-def bare_points(*, correlation: float = 0.0, repeats: int = 1) -> LoadPoints:
+def bare_points(*, correlation=0.0, repeats=1) -> LoadPoints:
     """Points of a load whose voltages are still to be drawn."""
     x = np.tile(_POSITIONS, repeats)
     apart = np.abs(np.subtract.outer(np.arange(x.size), np.arange(x.size)))
@@ -92,10 +92,10 @@ class Laboratory:
         """Points of each load with the family and the sensor."""
         return Channel(points, self.sensor, self.family)
 
-    def measured(self, friction: float, seed: int, *, systematic: bool = True) -> list[LoadPoints]:
+    def measured(self, friction: float, seed: int, *, systematic=True) -> list[LoadPoints]:
         """Draw the voltages of every load."""
         rng = np.random.default_rng(seed)
-        common: dict[str, np.ndarray] = {}
+        common = {}
         measured = []
         for load, points in enumerate(self.points):
             found = self.predicted(friction, load)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 
-def assert_same_to_rounding(found: Any, expected: Any) -> None:
+def assert_same_to_rounding(found, expected):
     """Compare arrays to 1e-12 of the largest value."""
     close = 1e-12 * float(np.max(np.abs(expected)))
     np.testing.assert_allclose(found, expected, rtol=0, atol=close)
@@ -21,7 +21,7 @@ def once(work: Callable[[], Any]) -> float:
     return perf_counter() - start
 
 
-def show(what: str, ratio: float, stated: float, *, gross: float = 5.0) -> None:
+def show(what: str, ratio: float, stated: float, *, gross=5.0):
     """Print a ratio of times beside the stated one; only a gross excess is a fault.
 
     A busy machine may slow down one of two computations by much.

@@ -1,7 +1,6 @@
 """Meshes as finite-element programs leave them, with a stress in closed form."""
 
 from pathlib import Path
-from typing import Any
 
 import meshio
 import numpy as np
@@ -10,25 +9,25 @@ RADII = np.linspace(0.0, 8.0, 41)
 HEIGHTS = np.linspace(0.0, 2.0, 4)
 
 
-def write(mesh: meshio.Mesh, path: Path, **options: Any) -> Path:
+def write(mesh: meshio.Mesh, path: Path, **options) -> Path:
     """Write a mesh with meshio, in the format of the file's name."""
     formats = {".vtu": meshio.vtu, ".vtk": meshio.vtk, ".xdmf": meshio.xdmf}
     formats[path.suffix].write(str(path), mesh, **options)
     return path
 
 
-def pressure(r: Any) -> Any:
+def pressure(r):
     """Normal stress at the base in MPa, r in mm, that carries 1 N."""
     return np.exp(-np.square(r) / 2) / (2 * np.pi)
 
 
-def tensor(r: Any, z: Any) -> np.ndarray:
+def tensor(r, z) -> np.ndarray:
     """Components rr, zz, hoop, rz of a stress in MPa, tension positive; not in equilibrium."""
     s = pressure(r)
     return np.stack([-s / 3, -s * (1 + z), -s / 5, r * s / 4], axis=-1)
 
 
-def grid(*axes: Any) -> tuple[np.ndarray, np.ndarray]:
+def grid(*axes) -> tuple[np.ndarray, np.ndarray]:
     """Points of a grid, and the corners of its quadrilaterals or hexahedra."""
     points = np.stack([each.ravel() for each in np.meshgrid(*axes, indexing="ij")], axis=-1)
     index = np.arange(len(points)).reshape([len(axis) for axis in axes])
@@ -42,7 +41,7 @@ def grid(*axes: Any) -> tuple[np.ndarray, np.ndarray]:
     return points, np.stack([index[each].ravel() for each in corners], axis=-1)
 
 
-def section(plane: str = "xy", *, radii: Any = RADII, heights: Any = HEIGHTS) -> meshio.Mesh:
+def section(plane="xy", *, radii=RADII, heights=HEIGHTS) -> meshio.Mesh:
     """A section of the film in a plane, radius first, with its stress in many shapes."""
     flat, cells = grid(radii, heights)
     r, z = flat.T
@@ -66,7 +65,7 @@ def section(plane: str = "xy", *, radii: Any = RADII, heights: Any = HEIGHTS) ->
     return meshio.Mesh(points, [("quad", cells)], point_data=at_points, cell_data=at_cells)
 
 
-def block(x: Any, y: Any, *, centre: tuple[float, float] = (0.0, 0.0)) -> meshio.Mesh:
+def block(x, y, *, centre=(0.0, 0.0)) -> meshio.Mesh:
     """A film in 3-D, z across it, with the same stress about the axis through the centre."""
     points, cells = grid(x, y, np.linspace(0.0, 2.0, 3))
     dx = points[:, 0] - centre[0]

@@ -12,7 +12,7 @@ from memscal.formats.hdf5.writer import Group, walk
 OURS = Path(str(files("memscal.formats"))) / "definitions"
 
 
-def definitions_folder(folder: Path, package: str = "nexusformat") -> Path:
+def definitions_folder(folder: Path, package="nexusformat") -> Path:
     """Lay the definitions that a package brings, and ours, in a folder."""
     spec = find_spec(package)
     assert spec is not None
@@ -30,7 +30,7 @@ def violations(path: Path, definitions: Path) -> list[str]:
     """Warnings and errors of a file against the application definition that it names."""
     from nexusformat.nexus.validate import logger, validate_application
 
-    found: list[str] = []
+    found = []
     handler = logging.Handler(logging.WARNING)
     handler.emit = lambda record: found.append(f"{record.levelname}: {record.getMessage()}")
     handlers = logger.handlers

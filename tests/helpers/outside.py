@@ -10,7 +10,6 @@ double Fourier sum over the plane, so that G and the line may be anything.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, lru_cache
-from typing import Any
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -74,7 +73,7 @@ class World:
     shear_sensitivity: float = 0.0  # length in m, of the divergence of the base shear
     lag: float = 0.0  # m, along the scan
 
-    def voltages(self, x: FloatArray, *, y: float = 0.0, along: str = "x") -> FloatArray:
+    def voltages(self, x: FloatArray, *, y=0.0, along="x") -> FloatArray:
         """Voltages (n,) without noise at stated positions along a line, in V."""
         k, modulus, places = plane()
         kx, ky = np.meshgrid(k, k, indexing="ij")
@@ -125,7 +124,7 @@ def layer(nu: float, *, slides: bool) -> CubicSpline:
     return CubicSpline(depths, base[:, ::-1, 1])
 
 
-def answers(nu: float, q: FloatArray, *, slides: bool = False) -> tuple[FloatArray, FloatArray]:
+def answers(nu: float, q: FloatArray, *, slides=False) -> tuple[FloatArray, FloatArray]:
     """Displacements (outward, down) and base stress (shear, normal), by surface shear and pressure.
 
     At wavenumbers times thickness q (n,), each (n, 2, 2), for a film of unit thickness and modulus.
@@ -158,7 +157,7 @@ def answers(nu: float, q: FloatArray, *, slides: bool = False) -> tuple[FloatArr
     return surface, base
 
 
-def line(half_range: float = HALF_RANGE, step: float = 0.25e-3) -> FloatArray:
+def line(half_range: float = HALF_RANGE, step=0.25e-3) -> FloatArray:
     """Positions of a line scan, in m."""
     return np.arange(-half_range, half_range + step / 2, step)
 
@@ -167,11 +166,11 @@ def scan(
     world: World,
     seed: int,
     *,
-    noise: float = 0.005,
+    noise=0.005,
     x: FloatArray | None = None,
-    noise_stated: bool = True,
-    along: str = "x",
-    y: float = 0.0,
+    noise_stated=True,
+    along="x",
+    y=0.0,
 ) -> Scan:
     """Return a scan as a user would import it: of the paper's film and rod, which it states."""
     rng = np.random.default_rng(seed)
@@ -192,7 +191,7 @@ def scan(
     )
 
 
-def wide_scan(seed: int, *, width: float = 1.3e-3, places: int = 20, **made: Any) -> Scan:
+def wide_scan(seed: int, *, width=1.3e-3, places=20, **made) -> Scan:
     """Return a scan of 20 mm over a film of 2.5 mm by a Gaussian sensor, its centre anywhere."""
     x = np.linspace(-9.5e-3, 9.5e-3, places)
     rng = np.random.default_rng(seed)
@@ -201,7 +200,7 @@ def wide_scan(seed: int, *, width: float = 1.3e-3, places: int = 20, **made: Any
     return replace(measured, x=x, film=replace(FILM, thickness=2.5e-3))
 
 
-def clipped(measured: Scan, count: int, *, seed: int = 0, scatter: float = 3e-5) -> Scan:
+def clipped(measured: Scan, count: int, *, seed=0, scatter=3e-5) -> Scan:
     """Return a scan whose highest readings agree to a share of the largest."""
     u = measured.u_zz
     falling = np.sort(u)[::-1]
@@ -223,7 +222,7 @@ Noise = Callable[[np.random.Generator, int], FloatArray]
 def correlated(kept: float, size: float, white: float) -> Noise:
     """Return noise of this size that keeps a share from point to point, beside white noise."""
 
-    def noise(rng: np.random.Generator, count: int) -> FloatArray:
+    def noise(rng, count):
         steps = np.sqrt(1 - kept**2) * rng.standard_normal(count)
         steps[0] = rng.standard_normal()
         walk = lfilter([1.0], [1.0, -kept], steps)
@@ -251,11 +250,11 @@ def elliptic(ratio: float) -> World:
     return replace(ROUND, parts=(Part(width=(SIGMA * root, SIGMA / root)),))
 
 
-def lobe(distance: float, share: float = 0.2) -> World:
+def lobe(distance: float, share=0.2) -> World:
     """Return the world with a share of the sensitivity beside the line."""
     return replace(ROUND, parts=(Part(1 - share), Part(share, centre=(0.0, distance))))
 
 
-def tail(weight: float, width: float = 3e-3) -> World:
+def tail(weight: float, width=3e-3) -> World:
     """Return the world with a share of the sensitivity in a wide tail."""
     return replace(ROUND, parts=(Part(1 - weight), Part(weight, width=(width, width))))

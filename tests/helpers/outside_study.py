@@ -57,7 +57,7 @@ def states(name: str) -> Stated:
 def states_of_film(name: str) -> Stated:
     """Say how a scan states the size as a standard uncertainty of its film."""
 
-    def stated(scan: Scan, size: float) -> Scan:
+    def stated(scan, size):
         return replace(scan, film=replace(scan.film, **{f"{name}_uncertainty": size}))
 
     return stated
@@ -172,7 +172,7 @@ class NoiseRow(Row):
 
     def stated_deviations(self, size: float, draws: int) -> list[float]:
         """Deviations of scans without an alarm."""
-        z: list[float] = []
+        z = []
         seed = 0
         while len(z) < draws:
             scan = perturbed_scan(ROUND, seed, noise=0.0, noise_stated=False)
@@ -232,7 +232,7 @@ class Outcome:
 def outcome(row: Row, runs: int = RUNS, draws: int = DRAWS) -> Outcome:
     """Run one row of the study."""
     two, three = row.sizes_at((2.0, 3.0))
-    failed: Counter[str] = Counter()
+    failed = Counter()
     alarmed = math.nan
     sizes = [size for size in (two, three) if math.isfinite(size)]
     if sizes:

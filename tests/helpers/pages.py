@@ -1,7 +1,5 @@
 """What a page is measured by in a browser."""
 
-from typing import Any
-
 #: A4 less margins of 15 mm, in CSS pixels of 1/96 inch.
 PAPER = {"width": round(180 / 25.4 * 96), "height": round(267 / 25.4 * 96)}
 
@@ -19,14 +17,13 @@ _CUT = """() => {
 }"""
 
 
-def cut(page: Any) -> list[str]:
+def cut(page) -> list[str]:
     """Return what would be cut on a sheet, of a page that is as wide and high as one."""
     page.emulate_media(media="print")
-    found: list[str] = page.evaluate(_CUT)
-    return found
+    return page.evaluate(_CUT)
 
 
-def violations(page: Any, axe: str) -> dict[str, list[str]]:
+def violations(page, axe: str) -> dict[str, list[str]]:
     """Return the rules of accessibility that a page breaks, and where."""
     page.evaluate(axe)  # the policy of a page does not hold for it
     found = page.evaluate("axe.run()")

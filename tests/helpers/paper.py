@@ -3,7 +3,7 @@
 from memscal import ElasticFilm, Rod, Sphere
 
 
-def film(nu: float = 0.5, thickness: float = 2e-3) -> ElasticFilm:
+def film(nu=0.5, thickness=2e-3) -> ElasticFilm:
     """Film of 2.2 MPa that states neither uncertainties nor a law."""
     return ElasticFilm(young_modulus=2.2e6, poisson_ratio=nu, thickness=thickness)
 

@@ -186,7 +186,7 @@ def photutils(scan: Scan, truth: Kernel) -> FloatArray:
     return plane.radial(plane.best(kernels, truth))
 
 
-PEERS: dict[str, Peer] = {
+PEERS = {
     "deerlab": deerlab,
     "inference": inference_tools,
     "photutils": photutils,

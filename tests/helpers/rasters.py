@@ -66,9 +66,9 @@ def clean_raster(kernel: TailedEllipse, side: int, half: float) -> FloatArray:
 def tailed_raster(
     *,
     seed: int,
-    noise: float = 0.005,
-    side: int = 65,
-    half: float = 6e-3,
+    noise=0.005,
+    side=65,
+    half=6e-3,
     kernel: TailedEllipse = TailedEllipse(),
 ) -> memscal.Scan:
     """Raster of independent noise, a share of the largest voltage, which it does not state."""

@@ -2,7 +2,6 @@
 
 import dataclasses
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
@@ -10,9 +9,7 @@ EXACT = 4.5e-16
 """Twice the rounding of one multiplication and one division by a power of ten."""
 
 
-def assert_same(
-    found: Any, expected: Any, *, but: tuple[str, ...] = (), rtol: float = EXACT, where: str = ""
-) -> None:
+def assert_same(found, expected, *, but=(), rtol: float = EXACT, where=""):
     """Compare two values field by field and item by item, floats to a relative tolerance."""
     if dataclasses.is_dataclass(expected):
         assert isinstance(found, type(expected)), where

@@ -13,7 +13,7 @@ from memscal.mechanics.tabulated_rod import tabulated_rod
 H = 2e-3
 
 
-def compare_with_the_table(nu: float, radius: float, depths: list[float], sticking: bool) -> None:
+def compare_with_the_table(nu: float, radius: float, depths: list[float], sticking: bool):
     """Assert that spectra, stress and depth agree; radius and depths in thicknesses."""
     film = replace(paper.film(nu), law="neo-hookean")
     rod = Rod(radius=radius * H)

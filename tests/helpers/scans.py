@@ -35,7 +35,7 @@ EXACT_FILM = replace(
     thickness_uncertainty=None,
 )
 EXACT_ROD = replace(PAPER_ROD, radius_uncertainty=None)
-STILL: dict[str, Any] = {"noise": 0.0, "baseline": 0.0, "drift": 0.0}
+STILL = {"noise": 0.0, "baseline": 0.0, "drift": 0.0}
 
 
 def in_record(options: dict[str, Any]) -> dict[str, Any]:
@@ -45,40 +45,40 @@ def in_record(options: dict[str, Any]) -> dict[str, Any]:
     return options | {"disturbances": record}
 
 
-def simulate(**options: Any) -> Scan:
+def simulate(**options) -> Scan:
     """Simulate a rod scan; options are those of the simulation and of its disturbances."""
     return memscal.simulate(**in_record(options))
 
 
-def simulate_contacts(**options: Any) -> Scan:
+def simulate_contacts(**options) -> Scan:
     """Simulate a scan of a sphere's contacts likewise."""
     return contacts.simulate_contacts(**in_record(options))
 
 
-def simulate_experiment(**options: Any) -> memscal.Experiment:
+def simulate_experiment(**options) -> memscal.Experiment:
     """Simulate an experiment likewise."""
     return memscal.simulate_experiment(**in_record(options))
 
 
-def simulated(branch: Any = None, **options: Any) -> Scan:
+def simulated(branch=None, **options) -> Scan:
     """Simulate a scan whose film, rod and load are exact; its branches may be named."""
     exact = {"film": EXACT_FILM, "rod": EXACT_ROD, "load_uncertainty": None}
     return replace(simulate(**(exact | options)), branch=branch)
 
 
-def estimated(scan: Scan, *, angular: bool = False) -> ProfileEstimate:
+def estimated(scan: Scan, *, angular=False) -> ProfileEstimate:
     """Estimate the profile of a scan with the rod's own solution as reference."""
-    points: ScanPoints = calibration_points(scan)
+    points = calibration_points(scan)
     contact = memscal.indent(scan.film, scan.indenter, load=scan.load)
     return estimate_profile(points, reference_spectrum(contact, points), angular=angular)
 
 
-def reference_spectrum(reference: Any, points: ScanPoints, nodes: Any = None) -> RadialSpectrum:
+def reference_spectrum(reference, points: ScanPoints, nodes=None) -> RadialSpectrum:
     """Transform of one scan's reference per newton."""
     return reference_spectra([reference], [points], nodes)[0]
 
 
-def as_points(scan: Scan, seed: int = 0) -> Scan:
+def as_points(scan: Scan, seed=0) -> Scan:
     """Return the same readings as single points, in random order."""
     order = np.random.default_rng(seed).permutation(scan.u_zz.size)
     x, y = (positions.ravel()[order] for positions in scan.positions)
@@ -112,16 +112,12 @@ GAUSSIAN = memscal.GaussianMixture((1.0,), (SIGMA,))
 SENSOR = StressSensor(name="a simulated sensor", channel="zz")
 
 
-def pressed(
-    load: float = 1.0, friction: float = 0.0, *, film: Any = EXACT_FILM, indenter: Any = SPHERE
-) -> Contact:
+def pressed(load=1.0, friction=0.0, *, film=EXACT_FILM, indenter=SPHERE) -> Contact:
     """Press the paper's sphere on the film; the contact is remembered."""
     return memscal.indent(film, indenter, load=load, friction=friction)
 
 
-def sphere_scan(
-    contact: Contact, *, kernel: RadialKernel = GAUSSIAN, noise: float = 0.005, seed: int = 0
-) -> Scan:
+def sphere_scan(contact: Contact, *, kernel: RadialKernel = GAUSSIAN, noise=0.005, seed=0) -> Scan:
     """Scan a contact: its base stress convolved by Hankel transforms, noise, offset and drift."""
     x = np.linspace(-8e-3, 8e-3, 33)
     nodes = Wavenumbers.covering(40 / contact.film.thickness, 24e-3)
@@ -144,8 +140,8 @@ def sphere_scan(
 def known_apparatus(
     kernel: RadialKernel = GAUSSIAN,
     *,
-    conversion_uncertainty: float = 0.0,
-    width_uncertainty: float = 0.0,
+    conversion_uncertainty=0.0,
+    width_uncertainty=0.0,
 ) -> memscal.ApparatusFunction:
     """Return a sensor whose G is known, or wrong in one way only: wider or narrower.
 
@@ -177,14 +173,14 @@ def as_function(data: ApparatusData) -> memscal.ApparatusFunction:
 LOADS = (0.34, 0.69, 1.37, 2.75)
 
 
-def contact_scan(seed: int = 0, **options: Any) -> Scan:
+def contact_scan(seed=0, **options) -> Scan:
     """Scan contacts on an exactly known film, at exactly known nominal loads."""
     exact = {"film": EXACT_FILM, "sphere": SPHERE, "load": LOADS, "load_uncertainty": None}
     return simulate_contacts(seed=seed, **(exact | options))
 
 
 @lru_cache
-def measured(seed: int = 0, conversion_uncertainty: float = 0.0, **options: Any) -> MeasuredStress:
+def measured(seed=0, conversion_uncertainty=0.0, **options) -> MeasuredStress:
     """Measure such a scan with a sensor whose G is known."""
     known = known_apparatus(conversion_uncertainty=conversion_uncertainty)
     return memscal.measure_stress(contact_scan(seed, **options), known)
@@ -195,7 +191,7 @@ SHEAR_SIGMA = 400e-6
 SHEAR_KERNEL = memscal.GaussianMixture(sigmas=(SHEAR_SIGMA,))
 
 
-def shear_scan(*, kernel: RadialKernel = SHEAR_KERNEL, channel: str = "xz", **options: Any) -> Scan:
+def shear_scan(*, kernel: RadialKernel = SHEAR_KERNEL, channel="xz", **options) -> Scan:
     """Simulate a rod scan whose tangential channel has a G and an A of its own."""
     settings = {"film": LINEAR_FILM, "centre": (CENTRE, 0.0)} | options
     scan = simulate(shear=(kernel, SHEAR_CONVERSION), **settings)
@@ -203,7 +199,7 @@ def shear_scan(*, kernel: RadialKernel = SHEAR_KERNEL, channel: str = "xz", **op
     return replace(scan, channels=channels, direction=channel[0])
 
 
-def calibrated(scan: Scan, **options: Any) -> memscal.Calibration:
+def calibrated(scan: Scan, **options) -> memscal.Calibration:
     """Calibrate a scan, and spend no time on what explains the checks that it fails."""
     with patch("memscal.calibration.calibrate.explained", lambda _, checks: (checks, [])):
         return memscal.calibrate(scan, **options)

@@ -1,7 +1,6 @@
 """Tables imported with many options."""
 
 from dataclasses import fields
-from typing import Any
 
 from memscal.formats.tables.scan import ImportedScan, import_table
 from memscal.formats.tables.stated import ScanConditions, ScanUncertainties, TableLayout
@@ -13,9 +12,9 @@ RECORDS = {
 }
 
 
-def imported(source: Any, **options: Any) -> ImportedScan:
+def imported(source, **options) -> ImportedScan:
     """Import a table, with the fields of its records among the options."""
-    records: dict[str, Any] = {}
+    records = {}
     for name, record in RECORDS.items():
         stated = options.keys() & {item.name for item in fields(record)}
         records[name] = record(**{key: options.pop(key) for key in stated})

@@ -8,7 +8,6 @@ import sys
 from collections.abc import Callable
 from inspect import CO_OPTIMIZED
 from pathlib import Path
-from types import FrameType
 
 import memscal
 
@@ -18,9 +17,9 @@ DATA = Path(__file__).parents[2] / "calibration_data"
 
 def functions_run(job: Callable[[], object]) -> int:
     """Count the functions of the package that a job runs, comprehensions aside."""
-    found: set[tuple[str, int]] = set()
+    found = set()
 
-    def note(frame: FrameType, event: str, _: object) -> None:
+    def note(frame, event, _):
         code = frame.f_code
         inside = event == "call" and code.co_filename.startswith(PACKAGE)
         if inside and code.co_flags & CO_OPTIMIZED and not code.co_name.startswith("<"):
@@ -34,7 +33,7 @@ def functions_run(job: Callable[[], object]) -> int:
     return len(found)
 
 
-def main() -> None:
+def main():
     """Print how many functions each job runs."""
     for module in pkgutil.walk_packages(memscal.__path__, "memscal."):
         if module.name != "memscal.__main__":

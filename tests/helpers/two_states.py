@@ -53,7 +53,7 @@ def outcome(
     seed: int,
     worlds: dict[str, dict[str, Any]],
     radius: float = SPHERE.radius,
-    width: float = 0.015,
+    width=0.015,
     gain_uncertainty: float = GAIN,
     load_uncertainty: float = LOAD,
 ) -> Outcome:
@@ -86,9 +86,7 @@ def outcome(
 
 
 @cache
-def perturbed(
-    lubricated: float, seed: int, gain: float = 1.0, load: float = 1.0, **stated: float
-) -> Outcome:
+def perturbed(lubricated: float, seed: int, gain=1.0, load=1.0, **stated: float) -> Outcome:
     """An experiment as stated but for its lubricated scan."""
     worlds = {state: {"poisson_ratio": MEAN_RATIO} for state in STATES}
     worlds["lubricated"] |= {"gain": gain, "load_scale": load}
@@ -96,7 +94,7 @@ def perturbed(
 
 
 @cache
-def drawn(lubricated: float, seed: int, width: float = 0.015) -> Outcome:
+def drawn(lubricated: float, seed: int, width=0.015) -> Outcome:
     """An experiment whose film, sphere, gains and loads are drawn from what is stated."""
     rng = np.random.default_rng([seed, round(1000 * lubricated)])
     common = {

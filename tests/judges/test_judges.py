@@ -6,7 +6,6 @@ import sys
 import warnings
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import pytest
 from helpers.nexus import definitions_folder, violations
@@ -19,7 +18,7 @@ pytestmark = pytest.mark.judges
 
 
 @pytest.fixture(scope="module")
-def written(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+def written(tmp_path_factory):
     """A file of each kind as a user writes it, with all that it may hold."""
     folder = tmp_path_factory.mktemp("written")
     files = {
@@ -43,7 +42,7 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     apparatus = memscal.calibrate(scan).apparatus
     # NeXus has another meaning of names that end with "_offset".
     names = [name for name in STATED_ERRORS if name != "line_offset"]
-    stated: Any = {f"{name}_uncertainty": 1e-3 for name in names}
+    stated = {f"{name}_uncertainty": 1e-3 for name in names}
     memscal.write_scan(replace(scan, position_errors_by_repeat=True, **stated), files["line"])
     memscal.write_scan(memscal.read_scan(raster), files["raster"])
     run = [sys.executable, "-m", "memscal", "reference", "rod", "--load", "1"]
@@ -90,7 +89,7 @@ def test_pynx_finds_every_file_valid(written, tmp_path):
 def test_scippnexus_loads_every_group_as_it_is_meant(written):
     import scippnexus
 
-    def load(group: scippnexus.Group) -> None:
+    def load(group):
         with warnings.catch_warnings():
             warnings.simplefilter("error")
             group[()]

@@ -16,7 +16,7 @@ from helpers.scans import (
 )
 
 import memscal
-from memscal import MeasuredStress, SourceFile
+from memscal import SourceFile
 from memscal.errors import InputError
 from memscal.measurement.measure_stress import pooled_force
 from memscal.measurement.restore import single_loads
@@ -25,7 +25,7 @@ SENSOR = known_apparatus()
 QUIET = {"noise": 0.001, "load_scatter": 0.002, "position_error": 0.0}
 
 
-def ratios(found: MeasuredStress) -> np.ndarray:
+def ratios(found):
     return np.array([profile.force / profile.load for profile in found.profiles])
 
 

@@ -9,7 +9,7 @@ from helpers.bounds import FULL
 from scipy.stats import chi2
 
 import memscal
-from memscal import MeasuredProfile, Scan, SourceFile, StressSensor
+from memscal import SourceFile, StressSensor
 from memscal.axisymmetry.hankel import Wavenumbers
 from memscal.errors import DomainError, FitError, InputError
 from memscal.measurement.measure_stress import joined_stress
@@ -22,14 +22,14 @@ SENSOR = made.known_apparatus()
 ENDS = made.LOADS[::3]
 
 
-def blurred(load: float, r: np.ndarray, friction: float = 0.0) -> np.ndarray:
+def blurred(load, r, friction=0.0):
     """The contact's base stress convolved with the Gaussian by its transform, in closed form."""
     nodes = Wavenumbers.covering(40 / made.EXACT_FILM.thickness, 30e-3)
     stress = made.pressed(load, friction).base_spectrum(nodes.k)
     return np.asarray(nodes.synthesise(stress * made.GAUSSIAN.transform(nodes.k), r))
 
 
-def reduced(profile: MeasuredProfile) -> float:
+def reduced(profile):
     """Chi-square of a profile against the truth by its full covariance, over its points."""
     off = profile.s_zz - blurred(profile.load, profile.r)
     return float(off @ np.linalg.solve(profile.covariance, off)) / off.size
@@ -211,7 +211,7 @@ def test_a_film_of_another_name_is_refused_unless_it_is_overridden():
     assert found.process.configuration["override"] == list(found.overridden)
 
 
-def spoilt(row: int, columns: slice) -> Scan:
+def spoilt(row, columns):
     scan = made.contact_scan()
     u = scan.u_zz.copy()
     u[row, columns] = np.nan

@@ -20,7 +20,7 @@ K = np.linspace(0.0, 6e3, 41)
 WIDTH = 1.1e-3
 
 
-def hankel(order: int, profile: np.ndarray, r: np.ndarray, weights: np.ndarray) -> np.ndarray:
+def hankel(order, profile, r, weights):
     return np.asarray(jv(order, np.multiply.outer(K, r)) @ (2 * np.pi * weights * r * profile))
 
 
@@ -62,7 +62,7 @@ def test_fits_and_likelihoods_of_shapes_are_those_of_least_squares(seed):
     count = float(start.outlier_weight.sum())
     for shape, weighed in zip(shapes, weighed_shapes(shapes, start), strict=True):
 
-        def residual(theta: np.ndarray, shape: PressureShape = shape) -> np.ndarray:
+        def residual(theta, shape=shape):
             # By ln(force), ln(width), centre (mm), baseline and drift (mV).
             spectrum = (
                 reference.values * shape.transform(reference.wavenumbers.k, np.exp(theta[1]))[0]

@@ -11,7 +11,6 @@ from helpers.scans import simulate
 from scipy.stats import chi2
 
 import memscal
-from memscal.measurement.restoration import Restoration
 from memscal.mechanics.tabulated_rod import tabulated_rod
 
 EXACT = made.known_apparatus()
@@ -21,11 +20,11 @@ NOISE = 0.005
 SCAN = made.sphere_scan(made.pressed(), seed=1)
 
 
-def wider(share: float) -> memscal.GaussianMixture:
+def wider(share):
     return memscal.GaussianMixture((1.0,), ((1 + share) * made.SIGMA,))
 
 
-def apparatus_part(found: Restoration, source: str, r: np.ndarray) -> np.ndarray:
+def apparatus_part(found, source, r):
     """Standard uncertainty of the stress by one source, in Pa."""
     n = found.posterior.nodes
     matrix = found.posterior.estimate.model.reference.wavenumbers.synthesise(np.eye(n), r)
@@ -34,7 +33,7 @@ def apparatus_part(found: Restoration, source: str, r: np.ndarray) -> np.ndarray
 
 
 @lru_cache
-def restored(load: float, friction: float, seed: int, noise: float = NOISE) -> Restoration:
+def restored(load, friction, seed, noise=NOISE):
     contact = made.pressed(load, friction)
     scan = made.sphere_scan(contact, noise=noise, seed=seed)
     return memscal.restore(scan, EXACT, expected=contact)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from helpers.paper import SPHERE, film
 
-from memscal import Contact, Indenter, Rod, indent
+from memscal import Rod, indent
 from memscal.errors import InputError
 
 R = np.linspace(0.0, 8e-3, 60)
@@ -17,9 +17,7 @@ FULL = pytest.mark.full_study
 
 
 @lru_cache
-def by_both(
-    nu: float, indenter: Indenter, load: float, friction: float, loading: str = "incremental"
-) -> tuple[Contact, Contact]:
+def by_both(nu, indenter, load, friction, loading="incremental"):
     ways = [
         indent(
             film(nu),

@@ -11,7 +11,6 @@ from memscal import Cone, Contact, Profile, Rod, indent
 from memscal.axisymmetry.hankel import gauss_panels
 from memscal.errors import ConvergenceError, DomainError
 from memscal.mechanics.rod import solve_rod
-from memscal.model.arrays import FloatArray
 
 FRICTIONS = (0.0, 0.1, 0.3, 1.6, math.inf)
 
@@ -151,7 +150,7 @@ def test_a_profile_is_what_it_samples():
 
 
 def test_a_hollow_tip_touches_on_a_ring_first():
-    def hollow(r: FloatArray) -> FloatArray:
+    def hollow(r):
         dip = 5e-6 * (1 - np.minimum(r / 1.5e-3, 1) ** 2) ** 2
         return np.asarray(dip + np.maximum(r - 1.5e-3, 0) ** 2 / 0.05)
 

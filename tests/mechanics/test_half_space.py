@@ -31,7 +31,7 @@ def test_a_disc_of_pressure_presses_as_love_found(rings):
 
 @pytest.mark.parametrize("rings", [EVEN, CROWDED], ids=["even", "crowded"])
 def test_a_linear_outward_traction_is_integrated_as_adaptive_quadrature_does(rings):
-    def kernel(s: float, x: float) -> float:
+    def kernel(s, x):
         m = min(x, s) / max(x, s)
         return 2 / np.pi * (ellipk(m**2) - ellipe(m**2)) / min(x, s)
 

@@ -8,7 +8,7 @@ from helpers.paper import film
 
 from memscal import Rod, indent
 from memscal.axisymmetry.hankel import gauss_between, gauss_panels
-from memscal.mechanics.film_response import HankelField, HankelFilm
+from memscal.mechanics.film_response import HankelFilm
 
 
 @pytest.mark.parametrize("nu", [0.0, 0.3, 0.495, 0.5])
@@ -21,7 +21,7 @@ def test_the_compliance_is_reciprocal(nu):
     model = HankelFilm(film(nu), rings)
     one, other = (model.field(*rng.uniform(size=(2, rings.size))) for _ in range(2))
 
-    def along(forces: HankelField, moved: HankelField) -> float:
+    def along(forces, moved):
         p = forces.traction.pressure(r)
         q = forces.traction.shear(r)
         return float(measure @ (p * moved.surface(r, 0) + q * moved.surface(r, 1)))

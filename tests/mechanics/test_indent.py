@@ -9,14 +9,14 @@ from helpers.paper import FILM, ROD, film
 from scipy.interpolate import CubicSpline
 from scipy.special import j0
 
-from memscal import Contact, Rod, Sphere, indent
+from memscal import Rod, Sphere, indent
 from memscal.axisymmetry.hankel import gauss_panels
 from memscal.errors import DomainError, InputError
 
 CASES = [(nu, friction) for nu in (0.0, 0.3, 0.5) for friction in (0.0, math.inf)]
 
 
-def press(nu: float, friction: float, radius: float = 0.25e-3) -> Contact:
+def press(nu, friction, radius=0.25e-3):
     return indent(film(nu), Rod(radius=radius), load=0.5, friction=friction)
 
 

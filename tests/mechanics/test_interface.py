@@ -8,7 +8,7 @@ from helpers.paper import FILM, SPHERE
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
-from memscal import Contact, ElasticFilm, Rod, indent
+from memscal import ElasticFilm, Rod, indent
 from memscal.errors import InputError
 from memscal.mechanics.interface import ExponentialCompliance, GreenwoodTripp, Interface
 
@@ -17,7 +17,7 @@ GREENWOOD_TRIPP = GreenwoodTripp(roughness=ROUGHNESS, asperity_density=5e9, aspe
 EXPONENTIAL = ExponentialCompliance(decay_length=0.8e-6, reference_pressure=0.5e6)
 
 
-def press(interface: Interface | None = None, load: float = 1.37, mu: float = 0.0) -> Contact:
+def press(interface=None, load=1.37, mu=0.0):
     return indent(FILM, SPHERE, load=load, friction=mu, interface=interface, rings=48)
 
 
@@ -25,7 +25,7 @@ def press(interface: Interface | None = None, load: float = 1.37, mu: float = 0.
 def test_the_pressure_is_the_sum_over_gaussian_asperities(separation):
     law = GreenwoodTripp(roughness=2.0, asperity_density=3.0, asperity_radius=4.0)
 
-    def density(s: float) -> float:
+    def density(s):
         return (s - separation) ** 1.5 * math.exp(-(s**2) / 2) / math.sqrt(2 * math.pi)
 
     summed, _ = quad(density, max(separation, -12.0), 14.0, epsabs=0, epsrel=1e-11, limit=400)

@@ -1,7 +1,5 @@
 """A mesh with a field holds what it says, or says what it lacks."""
 
-from typing import Any
-
 import numpy as np
 import pytest
 
@@ -9,7 +7,7 @@ from memscal.errors import InputError
 from memscal.model.field_mesh import FieldMesh
 
 
-def parts(**changes: Any) -> dict[str, Any]:
+def parts(**changes):
     return {
         "points": [[0.0, 0.0], [1e-3, 0.0], [0.0, 1e-3]],
         "triangles": [[0, 1, 2]],

@@ -1,12 +1,9 @@
 """Holds in a log: found whatever the load cell shows, and averaged with what they scatter by."""
 
-from typing import Any
-
 import numpy as np
 import pytest
 
 from memscal.errors import InputError
-from memscal.model.holds import Holds
 from memscal.model.notation import VOLTS
 from memscal.readings.find_holds import find_holds
 
@@ -14,7 +11,7 @@ PLACES = np.linspace(-8e-3, 8e-3, 33)
 SIGNAL = 15e-3 * np.exp(-((PLACES / 1.2e-3) ** 2))
 
 
-def log(seed: int, correlation: float = 0.0, *, creep: float = 0.0) -> dict[str, Any]:
+def log(seed, correlation=0.0, *, creep=0.0):
     """Moves, presses with ramps and holds of 20 to 40 rows; noise of 2 uV."""
     rng = np.random.default_rng(seed)
     parts = []
@@ -38,7 +35,7 @@ def log(seed: int, correlation: float = 0.0, *, creep: float = 0.0) -> dict[str,
     return {"x": x + rng.normal(size=x.size) * 1e-6, "normal_load": load, "u_zz": u + 2e-6 * noise}
 
 
-def found(columns: dict[str, Any], depth: Any = None, **options: Any) -> Holds:
+def found(columns, depth=None, **options):
     columns = {name: values for name, values in columns.items() if name != "depth"}
     return find_holds(columns, np.arange(columns["x"].size), VOLTS, depth=depth, **options)
 
@@ -77,7 +74,7 @@ def test_what_is_no_log_is_refused_and_a_short_press_is_left_out():
         found({n: v[::40] for n, v in columns.items()})
 
 
-def presses(sensor: float, waits: dict[int, int], drift: float = 0.0) -> dict[str, Any]:
+def presses(sensor, waits, drift=0.0):
     """13 places, presses of 137 rows to 0.1 mm; before some the raised indenter waits longer."""
     x, depth = [], []
     for i, place in enumerate(np.linspace(-6e-3, 6e-3, 13)):

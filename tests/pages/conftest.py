@@ -2,21 +2,19 @@
 
 import os
 import shutil
-from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 
 @pytest.fixture(scope="session")
-def axe() -> str:
+def axe():
     """The script of axe-core, which nox --session pages fetches."""
     return Path(os.environ["MEMSCAL_AXE"]).read_text(encoding="utf-8")
 
 
 @pytest.fixture(scope="session")
-def browser() -> Iterator[Any]:
+def browser():
     from playwright.sync_api import sync_playwright
 
     program = shutil.which("chromium")
@@ -28,12 +26,12 @@ def browser() -> Iterator[Any]:
 
 
 @pytest.fixture
-def opened(browser: Any) -> Iterator[Callable[..., Any]]:
+def opened(browser):
     """Open a page; what it asks for beside itself and says on the console are errors."""
-    heard: list[str] = []
+    heard = []
     contexts = []
 
-    def open_(path: Path, **options: Any) -> Any:
+    def open_(path, **options):
         contexts.append(browser.new_context(**options))
         page = contexts[-1].new_page()
         page.on("console", lambda message: heard.append(message.text))

@@ -21,7 +21,7 @@ LONG = "a_name_without_a_place_to_break_it_" * 4 + "<b>&amp;"
 
 
 @pytest.fixture(scope="session")
-def reports(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+def reports(tmp_path_factory):
     """The report of each command, those of batch and calibrate with failures; a certificate."""
     folder = tmp_path_factory.mktemp("reports")
     pages = {kind: folder / f"{kind}.html" for kind in (*KINDS, "certificate")}

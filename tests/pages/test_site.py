@@ -8,7 +8,6 @@ import re
 import shlex
 from html import unescape
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -20,14 +19,14 @@ NAMES = {f"docs/api/memscal.{name}" for name in ("calibrate", "Calibration", "Fi
 
 
 @pytest.fixture(scope="module")
-def site() -> Path:
+def site():
     return Path(os.environ["MEMSCAL_SITE"])
 
 
-def faults(browser: Any, path: Path, scheme: str, axe: str) -> list[str]:
+def faults(browser, path, scheme, axe):
     """Open a page; return what it loads from outside, what axe finds, and where it is too wide."""
     page = browser.new_page(viewport={"width": 1300, "height": 900}, color_scheme=scheme)
-    heard: list[str] = []
+    heard = []
     page.on("request", lambda request: heard.append(request.url[:200]))
     page.on("requestfailed", lambda request: heard.append(f"failed: {request.url}"))
     page.on("pageerror", lambda error: heard.append(str(error)))

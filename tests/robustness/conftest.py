@@ -1,10 +1,9 @@
 """The table of a campaign at the end of its run."""
 
-import pytest
 from robustness.campaign import SHARE, table
 
 
-def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+def pytest_terminal_summary(terminalreporter):
     """Print the table, unless the campaign is reduced."""
     if SHARE:
         terminalreporter.section("robustness")

@@ -2,10 +2,10 @@
 
 import contextlib
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import h5py
 import numpy as np
@@ -61,7 +61,7 @@ BYTES = st.lists(
 )
 
 
-def change_bytes(data: bytes, changes: Sequence[ByteChange]) -> bytes:
+def change_bytes(data, changes):
     """Return data with changes of bytes."""
     for kind, where, size, value in changes:
         at = int(where * max(len(data) - 1, 0))
@@ -124,7 +124,7 @@ EDITS = st.lists(
 )
 
 
-def edit_hdf5(data: bytes, edits: Sequence[Edit], *, digest: bool) -> bytes:
+def edit_hdf5(data, edits, *, digest):
     """Return an HDF5 file with edits; with ``digest`` it states that of what it then holds."""
     with TemporaryDirectory() as folder:
         path = Path(folder, "edited.h5")
@@ -139,14 +139,14 @@ def edit_hdf5(data: bytes, edits: Sequence[Edit], *, digest: bool) -> bytes:
         return path.read_bytes()
 
 
-def _items(file: h5py.File) -> dict[str, h5py.Dataset | h5py.Group]:
+def _items(file):
     """What stands at each path, in one pass: to open an item by its path takes far longer."""
-    items: dict[str, h5py.Dataset | h5py.Group] = {}
+    items = {}
     file.visititems(lambda name, item: items.update({f"/{name}": item}))
     return {path: item for path, item in items.items() if not path.startswith("/entry/contents")}
 
 
-def _edit(file: h5py.File, edit: Edit) -> None:
+def _edit(file, edit):
     paths = _items(file)
     datasets = {path: item for path, item in paths.items() if isinstance(item, h5py.Dataset)}
     # What an edit made to claim gigabytes is not filled with them.
@@ -187,11 +187,11 @@ def _edit(file: h5py.File, edit: Edit) -> None:
             del item.attrs[names[place % len(names)]]
 
 
-def _as(number: float, dtype: np.dtype[Any]) -> Any:
+def _as(number, dtype):
     return number if dtype.kind == "f" else int(np.clip(np.nan_to_num(number), 0, 100))
 
 
-def _replace(file: h5py.File, path: str, edit: Edit) -> None:
+def _replace(file, path, edit):
     attributes = dict(file[path].attrs)
     of = file[path].parent
     name = path.rpartition("/")[2]
@@ -204,7 +204,7 @@ def _replace(file: h5py.File, path: str, edit: Edit) -> None:
     elif edit.kind == "chunks":
         shape = (40,)
         options = {"chunks": (20,), "compression": "gzip", "shuffle": True}
-    dtype: Any = h5py.string_dtype() if edit.dtype == "O" else edit.dtype
+    dtype = h5py.string_dtype() if edit.dtype == "O" else edit.dtype
     made = of.create_dataset(name, shape, dtype, **options)
     if edit.kind != "sparse" and np.dtype(made.dtype).kind in "fiu" and made.size:
         made[...] = _as(min(max(np.nan_to_num(edit.number), -6e4), 6e4), made.dtype)
@@ -212,7 +212,7 @@ def _replace(file: h5py.File, path: str, edit: Edit) -> None:
         made.attrs[key] = attributes[key]
 
 
-def _list_contents(file: h5py.File) -> bool:
+def _list_contents(file):
     """Have the file list its contents, as its writer would; return whether it can."""
     items = _items(file)
     sizes = [item.size or 0 for item in items.values() if isinstance(item, h5py.Dataset)]
@@ -263,7 +263,7 @@ TABLE = st.lists(
 )
 
 
-def change_table(data: bytes, changes: Sequence[CellChange]) -> bytes:
+def change_table(data, changes):
     """Return a table of text with changes of cells, rows, separators or encoding."""
     lines = data.decode().splitlines()
     end = "\n"

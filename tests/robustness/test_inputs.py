@@ -8,7 +8,6 @@ import io
 import resource
 import time
 import warnings
-from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -41,7 +40,7 @@ SECONDS = 20.0
 GIBIBYTE = 2**30
 
 
-def drawn(reduced: int, whole: int) -> Callable[[Callable[..., None]], Callable[..., None]]:
+def drawn(reduced, whole):
     """Settings of a test that draws so many inputs."""
     return settings(
         max_examples=number(reduced, whole),
@@ -54,7 +53,7 @@ def drawn(reduced: int, whole: int) -> Callable[[Callable[..., None]], Callable[
 
 
 @contextlib.contextmanager
-def little_memory() -> Iterator[None]:
+def little_memory():
     """Bound what this process may take beyond what it holds."""
     soft, hard = resource.getrlimit(resource.RLIMIT_AS)
     held = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
@@ -68,12 +67,12 @@ def little_memory() -> Iterator[None]:
 class Good(dict[str, bytes]):
     """The bytes of a good file of each kind, which a failing example does not print."""
 
-    def __repr__(self) -> str:
+    def __repr__(self):
         return "good"
 
 
 @pytest.fixture(scope="module")
-def good(tmp_path_factory: pytest.TempPathFactory) -> Good:
+def good(tmp_path_factory):
     """The bytes of a good file of each kind."""
     folder = tmp_path_factory.mktemp("good")
     experiment = Path(__file__).parents[2] / "calibration_data" / "sphere_experiment"
@@ -99,7 +98,7 @@ def good(tmp_path_factory: pytest.TempPathFactory) -> Good:
     return Good({path.name: path.read_bytes() for path in folder.iterdir()})
 
 
-def survives(folder: Path, data: bytes, *commands: str, name: str = "in.h5") -> None:
+def survives(folder, data, *commands, name="in.h5"):
     """Run commands on a damaged file, and look at what each leaves."""
     for path in folder.iterdir():
         path.unlink()
@@ -128,13 +127,13 @@ def survives(folder: Path, data: bytes, *commands: str, name: str = "in.h5") -> 
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(tmp_path_factory):
     """A folder for the damaged file and what is made of it."""
     return tmp_path_factory.mktemp("damaged")
 
 
 LOOKED_AT = ("check in.h5", "inspect in.h5 --json")
-USED: dict[str, tuple[str, ...]] = {
+USED = {
     **dict.fromkeys(("reference", "artifact", "compact", "stress"), LOOKED_AT),
     **dict.fromkeys(("raster", "points"), (*LOOKED_AT, "calibrate in.h5 --dry-run")),
     "scan": (*LOOKED_AT, "calibrate in.h5 -o out.h5"),

@@ -10,8 +10,6 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 from helpers.builders import make_artifact, make_scan
@@ -38,13 +36,13 @@ CODES = {signal.SIGINT: 130, signal.SIGTERM: 143, signal.SIGHUP: 129}
 
 
 @pytest.fixture
-def folder(tmp_path: Path) -> Path:
+def folder(tmp_path):
     """A folder with a scan."""
     write_scan(simulate(noise=0.005, seed=1, points=33), tmp_path / "scan.h5")
     return tmp_path
 
 
-def start(folder: Path, *arguments: str) -> subprocess.Popen[str]:
+def start(folder, *arguments):
     return subprocess.Popen(
         [sys.executable, "-m", "memscal", *arguments],
         cwd=folder,
@@ -55,7 +53,7 @@ def start(folder: Path, *arguments: str) -> subprocess.Popen[str]:
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory: pytest.TempPathFactory) -> float:
+def whole(tmp_path_factory):
     """How long a run takes."""
     folder = tmp_path_factory.mktemp("timed")
     write_scan(simulate(noise=0.005, seed=1, points=33), folder / "scan.h5")
@@ -66,7 +64,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> float:
     return time.monotonic() - begin
 
 
-def interrupted(folder: Path, number: signal.Signals, delay: float) -> tuple[int, str]:
+def interrupted(folder, number, delay):
     """Run the command, send a signal after a while; return exit code and messages."""
     process = start(folder, *COMMAND)
     with contextlib.suppress(subprocess.TimeoutExpired):
@@ -116,7 +114,7 @@ def test_a_run_that_is_told_to_end_says_so_and_leaves_nothing(folder, seed, whol
 
 
 @contextlib.contextmanager
-def full_disk(folder: Path, size: int) -> Iterator[Path]:
+def full_disk(folder, size):
     """A small file system, where this process may mount one; otherwise a limit of every file."""
     disk = folder / "disk"
     disk.mkdir()
@@ -163,7 +161,7 @@ def test_no_flipped_bit_of_a_file_goes_unnoticed(tmp_path, seed):
         path.write_bytes(good)
 
 
-def described(path: Path) -> dict[str, object]:
+def described(path):
     """What a file holds, apart from the digest of its bytes."""
     try:
         return {key: value for key, value in describe(path).items() if key != "sha256"}

@@ -6,24 +6,24 @@ from pathlib import Path
 import pytest
 
 import memscal
-from memscal.extensions.certificate.certificate import Certificate, certify
-from memscal.extensions.certificate.laboratory import LaboratoryFile, read_laboratory
+from memscal.extensions.certificate.certificate import certify
+from memscal.extensions.certificate.laboratory import read_laboratory
 
 DATA = Path(__file__).parents[3] / "calibration_data"
 
 
 @pytest.fixture(scope="session")
-def laboratory() -> LaboratoryFile:
+def laboratory():
     return read_laboratory(DATA / "lab.toml")
 
 
 @pytest.fixture(scope="session")
-def apparatus() -> memscal.ApparatusFunction:
+def apparatus():
     """The shipped artifact of a sensor without a name, so that the file names it."""
     shipped = memscal.load_apparatus(DATA / "rod_scan_65.apparatus.h5")
     return replace(shipped, sensor=memscal.StressSensor())
 
 
 @pytest.fixture(scope="session")
-def certificate(apparatus, laboratory) -> Certificate:
+def certificate(apparatus, laboratory):
     return certify(apparatus, laboratory)

@@ -10,7 +10,7 @@ DATA = Path(__file__).parents[3] / "calibration_data"
 
 
 @pytest.fixture
-def inputs(tmp_path, monkeypatch) -> tuple[str, ...]:
+def inputs(tmp_path, monkeypatch):
     """The shipped artifact, and the shipped file of a laboratory for its sensor."""
     monkeypatch.chdir(tmp_path)
     shutil.copy(DATA / "rod_scan_65.apparatus.h5", "scan.apparatus.h5")

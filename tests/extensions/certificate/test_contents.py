@@ -16,7 +16,7 @@ from memscal.model.quantities import ESTIMATED
 LIMITS = "conversion_constant"
 
 
-def stating(laboratory: LaboratoryFile, section: str, **values: object) -> LaboratoryFile:
+def stating(laboratory, section, **values):
     """The file with other values, or without those that are ``None``."""
     held = {**laboratory.sections[section], **values}
     changed = {key: value for key, value in held.items() if value is not None}
@@ -87,7 +87,7 @@ def test_the_profile_is_that_of_the_artifact(apparatus, certificate):
     assert apparatus.radial(r[-1]) < 0.03 * apparatus.radial(0.0)
 
 
-def conformity(y: float, u: float, lower: float, upper: float, guard: float = 0.0) -> Conformity:
+def conformity(y, u, lower, upper, guard=0.0):
     return Conformity(CertifiedValue(ESTIMATED[LIMITS], y, u), lower, upper, guard)
 
 

@@ -11,7 +11,7 @@ from dcclib.validation import SchematronValidator, XsdValidator
 from dsi_unit import DsiUnit
 
 import memscal
-from memscal.extensions.certificate.certificate import Certificate, certify
+from memscal.extensions.certificate.certificate import certify
 from memscal.extensions.certificate.dcc import certificate_xml
 from memscal.extensions.certificate.page import certificate_page
 from memscal.formats.inspection import check
@@ -26,17 +26,17 @@ SCHEMA = os.environ.get("MEMSCAL_DCC_SCHEMA", "")
 
 
 @pytest.fixture(scope="module")
-def xml(certificate: Certificate) -> bytes:
+def xml(certificate):
     return certificate_xml(certificate)
 
 
 @pytest.fixture(scope="module")
-def root(xml: bytes) -> ET.Element:
+def root(xml):
     return ET.fromstring(xml)
 
 
 @pytest.fixture(scope="module")
-def others(apparatus, laboratory) -> list[bytes]:
+def others(apparatus, laboratory):
     """Certificates with as little as may be, an accreditation, and a tolerance that is not met."""
     few = {
         name: {k: v for k, v in section.items() if k not in ("street", "post_code", "email")}
@@ -50,13 +50,13 @@ def others(apparatus, laboratory) -> list[bytes]:
     return [certificate_xml(certify(a, replace(laboratory, sections=s))) for a, s in made]
 
 
-def found(root: ET.Element, path: str) -> ET.Element:
+def found(root, path):
     element = root.find(path, NAMES)
     assert element is not None, path
     return element
 
 
-def numbers(root: ET.Element, path: str) -> np.ndarray:
+def numbers(root, path):
     return np.array([float(text) for text in (found(root, path).text or "").split()])
 
 

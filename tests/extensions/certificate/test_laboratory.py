@@ -7,14 +7,14 @@ import pytest
 import memscal
 from memscal.cli import main
 from memscal.errors import MemscalError
-from memscal.extensions.certificate.laboratory import LaboratoryFile, Measured, read_laboratory
+from memscal.extensions.certificate.laboratory import Measured, read_laboratory
 
 pytestmark = pytest.mark.usefixtures("folder")
 
 SHIPPED = Path(__file__).parents[3] / "calibration_data" / "lab.toml"
 
 
-def read(text: str) -> LaboratoryFile:
+def read(text):
     Path("lab.toml").write_text(text, encoding="utf-8")
     return read_laboratory("lab.toml")
 
@@ -67,7 +67,7 @@ IMPORT = (
 )
 
 
-def imported(*options: str) -> int:
+def imported(*options):
     """Import a simulated scan from a table with the shipped file; return the exit code."""
     scan = memscal.simulate(seed=1)
     lines = [f"{x * 1e3},{u * 1e3}" for x, u in zip(scan.x, scan.u_zz, strict=True)]

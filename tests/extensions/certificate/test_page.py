@@ -4,7 +4,7 @@ import re
 from dataclasses import replace
 from html import unescape
 
-from memscal.extensions.certificate.certificate import Certificate, certify
+from memscal.extensions.certificate.certificate import certify
 from memscal.extensions.certificate.dcc import certificate_xml
 from memscal.extensions.certificate.page import certificate_page
 from memscal.model.assumptions import MOVED, NAMES, Assumption
@@ -13,11 +13,11 @@ from memscal.model.checks import QualityCheck
 NO_ACCREDITATION = "This is no accredited certificate"
 
 
-def text_of(certificate: Certificate) -> str:
+def text_of(certificate):
     return re.sub(r"<[^>]+>", " ", certificate_page(certificate).partition("<body>")[2])
 
 
-def stating(certificate: Certificate, section: str, **values: str) -> Certificate:
+def stating(certificate, section, **values):
     changed = {**certificate.sections[section], **values}
     return replace(certificate, sections={**certificate.sections, section: changed})
 

@@ -4,12 +4,11 @@ import io
 import re
 import socket
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from memscal.cli import main
-from memscal.extensions.certificate.certificate import Certificate, certify
+from memscal.extensions.certificate.certificate import certify
 from memscal.extensions.certificate.dcc import certificate_xml
 from memscal.extensions.certificate.page import certificate_page, certificate_pdf
 
@@ -23,7 +22,7 @@ DATA = Path(__file__).parents[3] / "calibration_data"
 
 
 @pytest.fixture(scope="module")
-def reader(certificate: Certificate) -> Any:
+def reader(certificate):
     import pypdf
 
     page = certificate_page(certificate)
@@ -76,7 +75,7 @@ def test_the_same_contents_and_date_give_the_same_bytes(apparatus, laboratory, m
 
 
 def test_nothing_is_fetched_for_the_pdf(certificate, monkeypatch):
-    def refuse(*_: object) -> None:
+    def refuse(*_):
         raise AssertionError("a connection was asked for")
 
     monkeypatch.setattr(socket.socket, "connect", refuse)

@@ -7,7 +7,7 @@ import pytest
 import skfem
 from helpers.paper import FILM, ROD, SPHERE, film
 
-from memscal import Contact, ElasticFilm, Rod, indent
+from memscal import Contact, Rod, indent
 from memscal.errors import ConvergenceError
 from memscal.extensions.finite_strain.film_elements import FilmElements, Rubber
 from memscal.extensions.finite_strain.pressing import Face
@@ -19,18 +19,18 @@ EDGE = 0.05e-3
 RADII = np.array([0.0, 0.5, 1.0, 2.0]) * 1e-3
 
 
-def film_of(nu: float = 0.5, ratio: float | None = None) -> ElasticFilm:
+def film_of(nu=0.5, ratio=None):
     law = "neo-hookean" if ratio is None else "mooney-rivlin"
     return replace(FILM, poisson_ratio=nu, law=law, mooney_rivlin_ratio=ratio)
 
 
-def cylinder(nu: float = 0.5, ratio: float | None = None) -> FilmElements:
+def cylinder(nu=0.5, ratio=None):
     mesh = skfem.MeshTri.init_tensor(np.linspace(0, 1.5, 5), np.linspace(0, 2, 4))
     return FilmElements(mesh, Rubber.of(film_of(nu, ratio)))
 
 
 @pytest.fixture(scope="module", params=[False, True], ids=["sliding", "sticking"])
-def pressed_rods(request: pytest.FixtureRequest) -> tuple[Contact, ...]:
+def pressed_rods(request):
     depths = (Depth(0.02e-3), Depth(0.04e-3), Depth(0.12e-3))
     return solve_finite_strain(FILM, ROD, depths, sticking=request.param, edge=EDGE, refinement=0.6)
 
@@ -186,7 +186,7 @@ def test_a_sticking_sphere_moves_nothing_outward_and_a_sliding_one_does():
 
 def test_a_frictionless_film_comes_back_the_way_it_went():
     loads = (Load(0.34), Load(0.5), Load(0.34))
-    shares: list[float] = []
+    shares = []
     with reporting(lambda progress: shares.append(progress.done / progress.total)):
         up, deeper, back = solve_finite_strain(FILM, SPHERE, loads, refinement=0.5)
     assert np.all(np.diff(shares) > 0)

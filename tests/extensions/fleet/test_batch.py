@@ -6,7 +6,6 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
@@ -16,7 +15,6 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from helpers.console import Outcome
 from helpers.scans import simulated
 from scipy.stats import binom
 
@@ -35,7 +33,7 @@ LARGE = 9
 
 
 @pytest.fixture(scope="module", autouse=True)
-def _a_thread_calibrates() -> Iterator[None]:
+def _a_thread_calibrates():
     """Start no processes in this one: those of a batch belong to the batches that are killed."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("memscal.parallel.worker_pool", ThreadPoolExecutor)
@@ -43,7 +41,7 @@ def _a_thread_calibrates() -> Iterator[None]:
 
 
 @pytest.fixture(scope="module")
-def fleet(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def fleet(tmp_path_factory):
     """A folder of scans, of which some cannot be used, and a manifest with places on a wafer."""
     folder = tmp_path_factory.mktemp("fleet")
     (folder / "scans").mkdir()
@@ -63,35 +61,35 @@ def fleet(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def results(fleet: Path) -> Path:
+def results(fleet):
     """The results of an uninterrupted batch."""
     assert main(arguments(fleet / "wafer.csv", fleet / "results")) == 1
     return fleet / "results"
 
 
 @pytest.fixture
-def copy(results: Path, fleet: Path, folder: Path) -> Path:
+def copy(results, fleet, folder):
     """A folder with the scans, their manifest and results, to be spoilt."""
     shutil.copytree(fleet, folder / "fleet")
     return folder / "fleet"
 
 
-def arguments(source: Path, results: Path, *further: str) -> list[str]:
+def arguments(source, results, *further):
     sizes = ["--shard-size", str(SHARD), "--workers", "1", *further]
     return ["batch", str(source), "-o", str(results), *sizes]
 
 
-def shards_of(outcome: Outcome) -> tuple[int, int]:
+def shards_of(outcome):
     """How many shards were written, and how many kept."""
     return outcome.json["shards_written"], outcome.json["shards_kept"]
 
 
-def batch(*given: Path | str) -> subprocess.Popen[bytes]:
+def batch(*given):
     """Start a batch as a process of its own."""
     return subprocess.Popen([sys.executable, "-m", "memscal", *arguments(*given)])
 
 
-def tables(results: Path) -> pd.DataFrame:
+def tables(results):
     return pd.read_parquet(results / "shards").drop(columns="calibrated_at")
 
 
@@ -279,7 +277,7 @@ def test_a_summary_of_several_units_is_refused(copy, run):
     run("summary", copy / "results").exits(3, "is damaged", "--resume")
 
 
-def fleet_of(a: np.ndarray, sigma: np.ndarray, error: float | np.ndarray) -> FleetResults:
+def fleet_of(a, sigma, error):
     """Return results of sensors without places, of these A and widths."""
     errors = error * np.ones(a.size)
     blank = np.full(a.size, np.nan)

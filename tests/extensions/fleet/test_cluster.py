@@ -2,9 +2,6 @@
 
 import os
 import signal
-from collections.abc import Iterator
-from concurrent.futures import Executor
-from pathlib import Path
 from threading import Thread
 from time import sleep
 
@@ -20,7 +17,7 @@ SCANS = 24
 
 
 @pytest.fixture(scope="module")
-def workers() -> Iterator[LocalCluster]:
+def workers():
     """Two processes with one thread each; one that dies is started anew."""
     options = {"processes": True, "dashboard_address": None, "worker_dashboard_address": None}
     with LocalCluster(n_workers=2, threads_per_worker=1, **options) as local:
@@ -28,7 +25,7 @@ def workers() -> Iterator[LocalCluster]:
 
 
 @pytest.fixture(scope="module")
-def scans(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def scans(tmp_path_factory):
     folder = tmp_path_factory.mktemp("scans")
     for seed in range(SCANS):
         scan = simulate(points=33, noise=0.004, seed=seed)
@@ -36,14 +33,14 @@ def scans(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def pids(client: Client) -> dict[str, int]:
+def pids(client):
     return client.run(os.getpid)
 
 
 def test_scans_come_in_their_order_from_a_cluster_of_which_a_worker_is_killed(workers, scans):
     paths = sorted(scans.iterdir())
     with Client(workers) as client:
-        executor: Executor = client.get_executor()
+        executor = client.get_executor()
         results = memscal.calibrate_many(paths, executor, method="bayesian")
         first = next(results)
         os.kill(next(iter(pids(client).values())), signal.SIGKILL)
@@ -56,9 +53,9 @@ def test_scans_come_in_their_order_from_a_cluster_of_which_a_worker_is_killed(wo
 def test_a_batch_outlives_a_worker_that_is_killed(workers, scans, tmp_path, capsys):
     results = tmp_path / "results"
     address = workers.scheduler_address
-    killed: list[int] = []
+    killed = []
 
-    def kill() -> None:
+    def kill():
         with Client(address) as client:
             victim = max(pids(client).values())
             while not list(results.glob("shards/*.parquet")):

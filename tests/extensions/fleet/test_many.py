@@ -1,34 +1,31 @@
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
-from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor
-from contextlib import AbstractContextManager, nullcontext
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from contextlib import nullcontext
 from dataclasses import replace
 from functools import partial
 from multiprocessing import get_context
-from typing import Any
 
 import numpy as np
 import pytest
 from helpers.scans import simulated
 
 import memscal
-from memscal import FleetCalibration, Scan
 from memscal.extensions.fleet import many as fleet
 from memscal.parallel import shared, worker_pool
 
 
-def scans(count: int) -> list[Scan]:
+def scans(count):
     return [simulated(noise=0.004, points=33, seed=seed) for seed in range(count)]
 
 
-def constant(result: FleetCalibration) -> float:
+def constant(result):
     assert result.parameters is not None, result.error
     return result.parameters["conversion_constant"]
 
 
-EXECUTORS: dict[str, Callable[[], AbstractContextManager[Executor | None]]] = {
+EXECUTORS = {
     "default": nullcontext,
     "threads": partial(ThreadPoolExecutor, 2),
     "processes": partial(ProcessPoolExecutor, 1, mp_context=get_context("spawn")),
@@ -67,7 +64,7 @@ class Counting(ThreadPoolExecutor):
 
     tasks = 0
 
-    def submit(self, *arguments: Any, **options: Any) -> Any:
+    def submit(self, *arguments, **options):
         self.tasks += 1
         return super().submit(*arguments, **options)
 
@@ -76,7 +73,7 @@ def test_scans_are_taken_as_workers_become_free_and_several_are_a_task(monkeypat
     monkeypatch.setattr(fleet, "attempted", lambda *_: memscal.MemscalError("not needed"))
     taken = 0
 
-    def endless() -> Iterator[str]:
+    def endless():
         nonlocal taken
         while True:
             taken += 1
@@ -117,7 +114,7 @@ def test_a_script_needs_no_guard(tmp_path):
 
 
 def test_what_is_no_error_of_ours_is_reported_as_such(monkeypatch):
-    def broken(scan: Scan, **_: object) -> object:
+    def broken(scan, **_):
         raise ZeroDivisionError("float division by zero")
 
     monkeypatch.setattr(fleet, "calibrate", broken)
@@ -152,7 +149,7 @@ def test_one_scan_is_no_list_and_no_scans_are_no_results():
 
 
 def test_what_a_generator_gave_before_it_failed_is_calibrated():
-    def failing() -> Iterator[memscal.Scan]:
+    def failing():
         yield from scans(3)
         raise OSError("the detector died")
 

@@ -11,7 +11,6 @@ from helpers.interface_points import (
     MACROSCOPIC,
     PAPER,
     PRECISE,
-    Precision,
     amontons,
     measured,
     read_without_error,
@@ -27,13 +26,12 @@ from memscal.extensions.interface_laws.model_comparison import (
     weigh_normal_compliance,
     weigh_slip_length,
 )
-from memscal.extensions.interface_laws.results import LawComparison
-from memscal.friction.family import ProfileFamily, bounded
+from memscal.friction.family import bounded
 from memscal.friction.likelihood import likelihood
 
 
 @lru_cache
-def weighed(truth: str, value: float, precision: Precision = PRECISE) -> LawComparison:
+def weighed(truth, value, precision=PRECISE):
     family = {"rigid": amontons, "slipping": slipping}[truth]()
     points = read_without_error(family, value, precision)
     return weigh_slip_length(
@@ -41,7 +39,7 @@ def weighed(truth: str, value: float, precision: Precision = PRECISE) -> LawComp
     )
 
 
-def relative_uncertainty(length: float, precision: Precision) -> float:
+def relative_uncertainty(length, precision):
     """Return what the likelihood's slope tells about a slip length, everything else free."""
     family = slipping()
     points = read_without_error(family, length, precision)
@@ -168,7 +166,7 @@ def test_an_uncertain_macroscopic_coefficient_makes_the_slip_length_as_uncertain
     assert found.standard_uncertainty == pytest.approx(math.hypot(alone, WIDENED * 1.6e-6), rel=0.1)
 
 
-def normal(truth: ProfileFamily, value: float) -> LawComparison:
+def normal(truth, value):
     return weigh_normal_compliance(measured(read_without_error(truth, value, PRECISE), yielding()))
 
 

@@ -6,7 +6,6 @@ from scipy.stats import multivariate_normal
 
 from memscal.extensions.interface_laws.model_comparison import LawCurve, one_of_all
 from memscal.friction.marginal_likelihood import (
-    Prior,
     Statistics,
     bounded_prior,
     evidence_of_each,
@@ -18,7 +17,7 @@ from memscal.model.bayes_factor import BayesFactor
 LOG_2PI = float(np.log(2 * np.pi))
 
 
-def statistics(residual: np.ndarray, systematic: np.ndarray, noise: np.ndarray) -> Statistics:
+def statistics(residual, systematic, noise):
     """Return what one group tells at one value: residual (n,), columns (n, q), noise (n,)."""
     r = residual / noise
     d = systematic / noise[:, None]
@@ -48,7 +47,7 @@ def test_data_without_any_misfit_have_no_chi_square():
 class Linear:
     """Loads whose stress is in proportion to a parameter of each, with systematic changes."""
 
-    def __init__(self, seed: int, loads: int) -> None:
+    def __init__(self, seed, loads):
         rng = np.random.default_rng(seed)
         x = np.linspace(0, 1, 25)
         self.noise = 0.01
@@ -62,7 +61,7 @@ class Linear:
             for j, (s, d) in enumerate(zip(self.shapes, self.columns, strict=True))
         ]
 
-    def exact(self) -> tuple[float, np.ndarray, np.ndarray]:
+    def exact(self):
         """Return the evidence under flat priors of density one, the best values, their errors."""
         n = self.shapes[0].size
         design = np.zeros((n * len(self.shapes), len(self.shapes)))
@@ -78,7 +77,7 @@ class Linear:
         log += (len(self.shapes) * LOG_2PI - np.linalg.slogdet(information)[1]) / 2
         return log, best, np.sqrt(np.diag(np.linalg.inv(information)))
 
-    def along(self, load: int, nodes: np.ndarray) -> Statistics:
+    def along(self, load, nodes):
         """Return what a load tells at values of its parameter."""
         residuals = self.data[load] - np.outer(nodes, self.shapes[load])
         each = [statistics(r, self.columns[load], np.full(r.size, self.noise)) for r in residuals]
@@ -103,7 +102,7 @@ def test_a_parameter_of_each_load_is_integrated_as_the_closed_form_does(seed, lo
     assert evidence_of_each(along, weights) == (log, error)
 
 
-def evidence(values: np.ndarray, edges: np.ndarray, log: np.ndarray, prior: Prior) -> float:
+def evidence(values, edges, log, prior):
     """Return the logarithm of the evidence of a law with one parameter."""
     nothing = np.zeros_like(values)
     none = Statistics(nothing, nothing, nothing, nothing)

@@ -7,7 +7,6 @@ import sys
 import tempfile
 import types
 import warnings
-from collections.abc import Iterable
 from pathlib import Path
 
 import h5py
@@ -16,7 +15,7 @@ import pytest
 from memscal.extensions.meshes import mesh_files, worker
 
 
-def limit_memory(memory: int, _: int) -> bool:
+def limit_memory(memory, _):
     """Let this process have so much more memory than it has, and no other limit."""
     pages = int(Path("/proc/self/statm").read_text().split()[0])
     most = pages * resource.getpagesize() + memory
@@ -25,13 +24,13 @@ def limit_memory(memory: int, _: int) -> bool:
 
 
 @pytest.fixture
-def at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+def at_once(monkeypatch):
     """Let the program that reads meshes run in this process, where memory can be limited."""
     limits = resource.getrlimit(resource.RLIMIT_AS)
     if sys.platform != "linux" or limits[1] != resource.RLIM_INFINITY:
         return
 
-    def run(parts: Iterable[bytes | memoryview], *_: object) -> bytes:
+    def run(parts, *_):
         with tempfile.TemporaryFile() as given, tempfile.TemporaryFile() as answer:
             given.writelines(parts)
             given.seek(0)

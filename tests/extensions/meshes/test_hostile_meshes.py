@@ -9,9 +9,7 @@ import struct
 import subprocess
 import tempfile
 import zlib
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import h5py
 import meshio
@@ -19,7 +17,7 @@ import numpy as np
 import pytest
 from helpers.meshes import section, write
 
-from memscal.errors import FormatError, InputError, MemscalError, UnsafeFileError
+from memscal.errors import FormatError, InputError, UnsafeFileError
 from memscal.extensions.meshes import mesh_files
 from memscal.extensions.meshes.mesh_files import Mesh, read_mesh
 
@@ -38,13 +36,13 @@ POINTS = (
 )
 
 
-def small(name: str, **options: Any) -> Path:
+def small(name, **options):
     """Save a small mesh with one stress."""
     mesh = meshio.Mesh(SMALL.points, SMALL.cells, point_data={"S9": SMALL.point_data["S9"]})
     return write(mesh, Path(name), **options)
 
 
-def edited(path: Path, old: str, new: str) -> Path:
+def edited(path, old, new):
     """Replace what stands exactly once in a text file."""
     text = path.read_text()
     assert text.count(old) == 1
@@ -52,12 +50,12 @@ def edited(path: Path, old: str, new: str) -> Path:
     return path
 
 
-def numbers_of(path: Path, name: str) -> str:
+def numbers_of(path, name):
     """Return the text of an array of a VTU file."""
     return path.read_text().partition(f'Name="{name}"')[2].partition(">")[2].partition("<")[0]
 
 
-def refused(path: Path, words="cannot be read", kind: type[MemscalError] = FormatError) -> str:
+def refused(path, words="cannot be read", kind=FormatError):
     """Return a refusal, which names the file and a cure."""
     with pytest.raises(kind, match=words) as caught:
         read_mesh(path)
@@ -126,14 +124,14 @@ def test_a_reader_that_is_killed_leaves_nothing_and_a_full_folder_is_no_damage(
     monkeypatch.setattr(tempfile, "tempdir", str(folder))
     run = subprocess.run
 
-    def watched(*arguments: Any, **options: Any) -> Any:
+    def watched(*arguments, **options):
         assert os.listdir(folder) == []  # nor would a kill leave anything
         return run(*arguments, **options)
 
     monkeypatch.setattr(subprocess, "run", watched)
     assert list(read_mesh(path).point_data) == ["S9"]
 
-    def full(*_: Any, **__: Any) -> None:
+    def full(*_, **__):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     monkeypatch.setattr(tempfile, "TemporaryFile", full)
@@ -377,10 +375,10 @@ vtk = types.SimpleNamespace(read=read)
 
 
 @pytest.fixture
-def hostile(tmp_path, monkeypatch) -> Callable[[str], Path]:
+def hostile(tmp_path, monkeypatch):
     """A mesh whose reader does, in the place of meshio, what a damaged one could be made to do."""
 
-    def with_reader(code: str) -> Path:
+    def with_reader(code):
         folder = tmp_path / "modules" / "meshio"
         folder.mkdir(parents=True)
         folder.joinpath("__init__.py").write_text(HOSTILE.format(code.replace("\n", "\n    ")))

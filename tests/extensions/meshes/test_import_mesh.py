@@ -17,7 +17,7 @@ MESH = ["--format", "reference", "--r-unit", "mm", "--sigma-unit", "MPa", "--loa
 
 
 @pytest.fixture
-def mesh(folder: Path) -> Path:
+def mesh(folder):
     """A section of a film, as another program saved it."""
     return Path(shutil.copy(DATA / "vtk_film.vtu", folder / "film.vtu"))
 

@@ -3,7 +3,6 @@
 import base64
 import re
 from pathlib import Path
-from typing import Any
 
 import meshio
 import numpy as np
@@ -13,7 +12,6 @@ from helpers.meshes import HEIGHTS, RADII, block, pressure, section, tensor, wri
 from memscal.errors import FormatError, InputError, UnitError
 from memscal.extensions.meshes.mesh_files import read_mesh
 from memscal.extensions.meshes.reference_mesh import read_reference_mesh
-from memscal.formats.tables.reference import ImportedProfile
 from memscal.mechanics.film_response import base_stress
 from memscal.model.film import ElasticFilm
 
@@ -27,20 +25,20 @@ class GaussianPressure:
 
     radius = 6e-3
 
-    def pressure_transform(self, k: Any) -> Any:
+    def pressure_transform(self, k):
         return np.exp(-np.square(k * 1e-3) / 2) / (2 * np.pi)
 
-    def shear_transform(self, k: Any) -> Any:
+    def shear_transform(self, k):
         return np.zeros_like(k)
 
 
-def imported(path: Path, sigma: str = "S6", **options: Any) -> ImportedProfile:
+def imported(path, sigma="S6", **options):
     """Import a mesh with the usual options."""
     given = {"r_unit": "mm", "sigma_unit": "MPa", "load": 1.0, **options}
     return read_reference_mesh(path, sigma=sigma, **given)
 
 
-def saved(mesh: meshio.Mesh, name: str = "film.vtu", **options: Any) -> Path:
+def saved(mesh, name="film.vtu", **options):
     """Save a mesh with meshio, whose XDMF knows no fields of four components."""
     if name.endswith(".xdmf"):
         for fields in (mesh.point_data, mesh.cell_data):
@@ -49,7 +47,7 @@ def saved(mesh: meshio.Mesh, name: str = "film.vtu", **options: Any) -> Path:
     return write(mesh, Path(name), **options)
 
 
-def assert_is_the_section(found: ImportedProfile, *, turned: int = 1) -> None:
+def assert_is_the_section(found, *, turned=1):
     profile = found.profile
     np.testing.assert_allclose(profile.r, RADII * 1e-3, rtol=1e-12)
     np.testing.assert_allclose(profile.sigma_zz, 1e6 * pressure(RADII), rtol=1e-12)
@@ -95,7 +93,7 @@ def test_appended_raw_bytes_are_read_as_paraview_writes_them(compression):
     path = saved(section(), compression=compression, header_type="UInt64")
     raw = b""
 
-    def append(array: re.Match[str]) -> str:
+    def append(array):
         nonlocal raw
         begin = len(raw)
         # Header and numbers are encoded apart.

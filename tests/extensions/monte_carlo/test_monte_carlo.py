@@ -1,4 +1,3 @@
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -7,9 +6,8 @@ from helpers.bounds import FULL
 from helpers.scans import EXACT_FILM, EXACT_ROD, LINEAR_FILM, TAILS, shear_scan, simulated
 
 import memscal
-from memscal import Calibration, Scan
 from memscal.calibration.uncertainty import BUDGETED
-from memscal.deconvolution.division import Division, DivisionProblem, create_regulariser
+from memscal.deconvolution.division import create_regulariser
 from memscal.errors import FitError
 from memscal.extensions.monte_carlo.monte_carlo import DrawnScans, shortest_interval
 from memscal.extensions.simulation.rod_scan import PAPER_FILM, PAPER_ROD
@@ -17,37 +15,37 @@ from memscal.extensions.simulation.rod_scan import PAPER_FILM, PAPER_ROD
 DRAWS = 100 if FULL else 40
 
 
-def uncertain(**options: object) -> Calibration:
+def uncertain(**options):
     """The paper's film and rod, with their uncertainties."""
     stated = {"film": PAPER_FILM, "rod": PAPER_ROD, "load_uncertainty": 0.01, "noise": 0.004}
     return memscal.calibrate(simulated(**(stated | options), seed=3), method="evidence")
 
 
-def drawn_scans(calibration: Calibration, seed: int = 0) -> DrawnScans:
+def drawn_scans(calibration, seed=0):
     return DrawnScans(calibration.solution, calibration.effects, calibration.correlations, seed)
 
 
-def spread_limit(draws: int) -> float:
+def spread_limit(draws):
     """Relative error of a standard deviation of normal draws, exceeded once in 16,000."""
     return 4.0 / np.sqrt(2 * draws)
 
 
 @pytest.fixture(scope="module")
-def paper() -> Calibration:
+def paper():
     return uncertain()
 
 
 @pytest.fixture(scope="module")
-def forty(paper: Calibration) -> memscal.MonteCarlo:
+def forty(paper):
     return memscal.monte_carlo(paper, draws=40, seed=8)
 
 
-def correlated(scan: Scan) -> Scan:
+def correlated(scan):
     apart = np.abs(np.subtract.outer(np.arange(scan.x.size), np.arange(scan.x.size)))
     return replace(scan, u_zz_correlation=0.4**apart, x_errors=np.full(scan.x.size, 2e-5))
 
 
-def incomplete(scan: Scan) -> Scan:
+def incomplete(scan):
     u = scan.u_zz.copy()
     u[30] += 0.3 * np.nanmax(u)
     u[10] = np.nan
@@ -56,7 +54,7 @@ def incomplete(scan: Scan) -> Scan:
 
 LINE = {"film": PAPER_FILM, "rod": PAPER_ROD, "noise": 0.004}
 THICKER = replace(PAPER_FILM, thickness=2.2e-3)
-CASES: dict[str, tuple[Sequence[Scan], dict[str, object]]] = {
+CASES = {
     "evidence": ([simulated(**LINE)], {"method": "evidence"}),
     "white-noise": ([simulated(**LINE)], {"method": "white-noise"}),
     "white-noise-draw": ([simulated(**LINE, points=33)], {"method": "white-noise-draw", "seed": 3}),
@@ -148,7 +146,7 @@ def test_a_budget_counts_that_poissons_ratio_never_exceeds_one_half():
 
 
 def test_draws_do_not_depend_on_the_number_of_processes(paper, forty):
-    told: list[memscal.Progress] = []
+    told = []
     options = {"seed": 8, "workers": 2, "progress": told.append}
     two = memscal.monte_carlo(paper, draws=18, **options)
     np.testing.assert_allclose(two.samples, forty.samples[:18], rtol=1e-9)
@@ -209,12 +207,12 @@ class Failing:
     name = "failing"
     fails = "It fails."
 
-    def __init__(self) -> None:
+    def __init__(self):
         self.method = create_regulariser("white-noise")
         self.refused = range(0)
         self.divisions = 0
 
-    def divide(self, problem: DivisionProblem) -> Division:
+    def divide(self, problem):
         self.divisions += 1
         if self.divisions in self.refused:
             raise FitError("This one is refused.")

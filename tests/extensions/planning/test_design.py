@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -15,14 +14,14 @@ from memscal.deconvolution.division import create_regulariser
 from memscal.errors import FitError, InputError
 from memscal.estimation.band import find_band
 from memscal.estimation.smoothing import smooth_profile
-from memscal.extensions.planning.design import Design, expected_calibration, varied_designs
+from memscal.extensions.planning.design import expected_calibration, varied_designs
 from memscal.extensions.simulation.rod_scan import PAPER_FILM
 
 EXACT = {"film": EXACT_FILM, "rod": EXACT_ROD, "load_uncertainty": None}
 
 
 @pytest.fixture(scope="module")
-def paper() -> Design:
+def paper():
     return memscal.design()
 
 
@@ -34,7 +33,7 @@ def test_sigma_has_the_bound_of_cramer_and_rao_by_finite_differences():
 
 
 def test_twice_the_load_or_four_repeats_halve_what_a_voltage_of_noise_makes_of_sigma():
-    changes: list[dict[str, Any]] = [{}, {"load": 2.0}, {"repeats": 4}]
+    changes = [{}, {"load": 2.0}, {"repeats": 4}]
     plans = [memscal.design(**EXACT, noise_voltage=5e-5, **change) for change in changes]
     once, heavy, often = (plan.relative_uncertainty("gaussian_sigma") for plan in plans)
     assert heavy == pytest.approx(often, rel=1e-6)
@@ -129,7 +128,7 @@ def test_what_is_found_reaches_the_target_and_one_less_does_not(want, vary):
     assert not reaches(before, want)
 
 
-def reaches(planned: Design, want: dict[str, float]) -> bool:
+def reaches(planned, want):
     names = {"A": "conversion_constant", "sigma": "gaussian_sigma", "fwhm": "fwhm"}
     resolved = planned.resolved_wavenumber >= want.get("resolved", 0.0)
     limits = {names[name]: value for name, value in want.items() if name != "resolved"}

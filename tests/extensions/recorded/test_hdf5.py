@@ -33,7 +33,7 @@ REFUSED = {
 
 
 @pytest.fixture
-def path(folder: Path) -> Path:
+def path(folder):
     with h5py.File("run.nxs", "w") as file:
         file.attrs["default"] = "data"
         data = file.create_group("data")

@@ -1,7 +1,6 @@
 """Synthetic contact scans and whole experiments: mechanics, force, statistics, stated truth."""
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -15,17 +14,16 @@ from memscal.extensions.simulation.contact_scan import PAPER_SPHERE
 from memscal.extensions.simulation.experiment import Reality, drawn
 from memscal.extensions.simulation.rod_scan import PAPER_FILM, PAPER_ROD
 from memscal.extensions.simulation.sensor import blurred_stress
-from memscal.model.scan import Scan
 
-EXACT: dict[str, Any] = {**STILL, "load_scatter": 0.0, "position_error": 0.0}
+EXACT = {**STILL, "load_scatter": 0.0, "position_error": 0.0}
 
 
-def truth(scan: Scan) -> dict[str, Any]:
+def truth(scan):
     return dict(scan.synthetic)
 
 
 def test_contacts_that_scatter_are_those_solved_at_their_own_loads(seed):
-    options: dict[str, Any] = {"load": [0.34, 1.37], "friction": 0.15, "points": 9, **STILL}
+    options = {"load": [0.34, 1.37], "friction": 0.15, "points": 9, **STILL}
     options |= {"spacing": 1e-3, "position_error": 0.0, "load_reading": 0.0}
     scan = simulate_contacts(record_loads=True, load_scatter=0.02, seed=seed, **options)
     each = np.sort(scan.normal_load, axis=None)
@@ -81,7 +79,7 @@ def test_what_cannot_be_scanned_is_refused(options, error, problem):
         simulate_contacts(**{"load": [0.34], **options})
 
 
-FEW: dict[str, Any] = {"loads": [0.69], "lubricated_loads": [0.69], "points": 9, "spacing": 2e-3}
+FEW = {"loads": [0.69], "lubricated_loads": [0.69], "points": 9, "spacing": 2e-3}
 NOMINAL = Reality(film=PAPER_FILM, rod=PAPER_ROD, sphere=PAPER_SPHERE)
 UNCERTAIN = (
     "film.young_modulus",

@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -14,7 +13,6 @@ from scipy.stats import chi2
 from memscal import GaussianMixture, SmoothedDisc
 from memscal.errors import InputError
 from memscal.extensions.simulation.rod_scan import PAPER_FILM
-from memscal.model.arrays import FloatArray
 
 RING = GaussianMixture((1.8, -0.8), (0.7e-3, 0.45e-3))
 DISC = SmoothedDisc(radius=0.8e-3, sigma=0.3e-3)
@@ -25,14 +23,14 @@ KERNELS = {"gaussian": GaussianMixture(), "ring": RING, "disc": DISC}
 def test_the_voltage_over_the_plane_is_the_constant_times_the_load(kernel):
     # The integral of a smooth field is the sum of a raster's pixels; this one, of an
     # incompressible film, is gone only at 20 thicknesses.
-    options: dict[str, Any] = {"points": 121, "half_range": 40e-3, "centre": (0.2e-3, -0.3e-3)}
+    options = {"points": 121, "half_range": 40e-3, "centre": (0.2e-3, -0.3e-3)}
     options |= {"film": LINEAR_FILM, "load": 2.0, "kernel": kernel}
     scan = simulate(raster=True, conversion_constant=3e-8, **options, **STILL)
     assert scan.u_zz.sum() * (scan.x[1] - scan.x[0]) ** 2 == pytest.approx(3e-8 * 2.0, rel=1e-6)
 
 
 def test_a_line_is_the_middle_row_of_a_raster():
-    options: dict[str, Any] = {
+    options = {
         "points": 33,
         "centre": (0.3e-3, 0.2e-3),
         "film": LINEAR_FILM,
@@ -47,7 +45,7 @@ def test_a_line_is_the_middle_row_of_a_raster():
 
 @pytest.mark.parametrize("noise", [0.001, 0.05])
 def test_the_noise_has_the_standard_deviation_that_is_stated(noise, seed):
-    options: dict[str, Any] = {"points": 65, "repeats": 60, "load": [0.5, 1.5], "film": LINEAR_FILM}
+    options = {"points": 65, "repeats": 60, "load": [0.5, 1.5], "film": LINEAR_FILM}
     noisy, clean = (simulate(noise=s, seed=seed, **options) for s in (noise, 0.0))
     residual = noisy.u_zz - clean.u_zz
     stated = noisy.u_zz_errors
@@ -73,7 +71,7 @@ def test_a_seed_gives_the_same_scan_whatever_else_draws_numbers(seed):
 
 
 def test_several_loads_give_repeats_of_a_rod_pressed_by_the_law_at_each():
-    options: dict[str, Any] = {"points": 17, "half_range": 4e-3, **STILL}
+    options = {"points": 17, "half_range": 4e-3, **STILL}
     loads = [0.1, 1.0]
     scan = simulate(load=loads, repeats=2, load_uncertainty=0.02, **options)
     assert (scan.kind, scan.load) == ("repeats", pytest.approx(0.55))
@@ -133,17 +131,17 @@ def test_the_stored_truth_rebuilds_the_kernel():
 class Own:
     """A disc by somebody else, of any size, whose transform is no number at k = 0."""
 
-    def __init__(self, size: float = 1.0) -> None:
+    def __init__(self, size=1.0):
         self.size = size
 
-    def transform(self, k: FloatArray) -> FloatArray:
+    def transform(self, k):
         phase = k * DISC.radius
         return self.size * 2 * j1(phase) / phase * np.exp(-0.5 * (DISC.sigma * k) ** 2)
 
-    def radial(self, r: FloatArray) -> FloatArray:
+    def radial(self, r):
         return self.size * DISC.radial(r)
 
-    def describe(self) -> dict[str, float | str]:
+    def describe(self):
         return {"kernel": "my own", "centre_of_mass": 0.0}
 
 

@@ -16,17 +16,17 @@ FULL = pytest.mark.full_study
 
 
 @cache
-def elements(nu: float, width: float, rings: int = 60, refinement: int = 1) -> ElementFilm:
+def elements(nu, width, rings=60, refinement=1):
     return ElementFilm(film(nu), np.linspace(0, width * H, rings + 1), refinement=refinement)
 
 
-def tractions(r: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def tractions(r):
     """A pressure with Hertz's edge, and a shear that does not look like its field."""
     x = r / r[-1]
     return 1e5 * np.sqrt(1 - x**2), 3e4 * x * (1 - x**2)
 
 
-def worst(found: np.ndarray, expected: np.ndarray, scale: np.ndarray) -> float:
+def worst(found, expected, scale):
     return float(np.max(np.abs(found - expected)) / np.max(np.abs(scale)))
 
 

@@ -6,14 +6,13 @@ import numpy as np
 import pytest
 from helpers.paper import film
 
-from memscal import FieldMesh
-from memscal.mechanics.elements.element_film import ElementField, ElementFilm
+from memscal.mechanics.elements.element_film import ElementFilm
 
 H = 2e-3
 
 
 @cache
-def solved(nu: float) -> tuple[ElementField, FieldMesh, np.ndarray, np.ndarray]:
+def solved(nu):
     r = np.linspace(0, H, 81)
     pressure = 1e5 * (1 - (r / H) ** 2) ** 2
     field = ElementFilm(film(nu), r).field(pressure, 0.2 * pressure * r / H)
