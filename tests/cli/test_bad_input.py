@@ -1,6 +1,5 @@
 """What cannot be calibrated: plain words, the right exit code, and the old output still there."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,7 +14,6 @@ from memscal.mechanics.press_rod import press_rod
 OLD = b"an artifact from last week"
 SIGNAL = "/entry/data/u_zz"
 SCAN = memscal.simulate(seed=1)
-Refused = Callable[..., None]
 
 
 @pytest.fixture

@@ -15,7 +15,6 @@ import memscal
 OLD = b"an artifact from last week"
 CALIBRATE = "memscal.calibration.calibrate.calibrate"
 PLOT = "memscal.model.result.Result.plot"
-Patch = pytest.MonkeyPatch
 
 
 def raising(error):

@@ -15,8 +15,6 @@ from memscal.cli.failures import CHECK_FAILED
 
 CHECKED = CHECK_FAILED
 REFUSED = 3
-NOT_WRITTEN = 4
-Patch = pytest.MonkeyPatch
 
 
 @pytest.fixture(scope="module")

@@ -1,6 +1,5 @@
 """Calibrations of simulated scans, with checks and messages of the tests' own."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 
@@ -8,11 +7,8 @@ import pytest
 from helpers.scans import simulate
 
 import memscal
-from memscal import ApparatusFunction
 from memscal.figures.calibration import calibration_figure
 from memscal.model.checks import Message
-
-MakeApparatus = Callable[..., ApparatusFunction]
 
 
 @cache

@@ -5,10 +5,8 @@ import subprocess
 import sys
 import tracemalloc
 import zlib
-from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
 
 import h5py
 import numpy as np
@@ -44,7 +42,6 @@ for i in [*range(8, len(good), 293 * step), *range(heap, heap + 160, step)]:
         refused += 1
 print(read, refused)
 """
-Edit = Callable[[Callable[[h5py.Group], Any]], Path]
 
 
 def filtered(group, size, chunk, flag, filters):

@@ -1,7 +1,6 @@
 """Families of calculated profiles, against contacts that are solved one by one."""
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +9,7 @@ from helpers.calculated_cases import LOADS, REACH, apart, profiles
 from helpers.machine import assert_same_to_rounding
 from helpers.paper import FILM, SPHERE
 
-from memscal import ElasticFilm, ExponentialCompliance, Interface, Rod, Sphere, indent
+from memscal import ExponentialCompliance, Interface, Rod, Sphere, indent
 from memscal.errors import DomainError, InputError
 from memscal.extensions.interface_laws.families import (
     SLIP_LENGTHS,
@@ -18,11 +17,9 @@ from memscal.extensions.interface_laws.families import (
     normal_compliance_family,
 )
 from memscal.friction.calculated import FRICTIONS, amontons_family
-from memscal.friction.family import FamilySetup, ProfileFamily
+from memscal.friction.family import FamilySetup
 
 LENGTHS = np.array([0.0, 0.25, 0.5, 1.0, 2.0, 4.0, 6.0, 8.0]) * 1.82e-6
-
-Build = Callable[[ElasticFilm, Sphere, list[float], list[float]], ProfileFamily]
 
 
 def amontons(**options):

@@ -7,7 +7,7 @@ is looked for, and return the best that any of their settings finds.  Repeats ar
 """
 
 import warnings
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
@@ -34,9 +34,6 @@ OUTERMOST_RING = 4e-3
 
 LARGEST_KH = 20.0
 """The film passes nothing of finer detail to its base."""
-
-
-Peer = Callable[[Scan, Kernel], FloatArray]
 
 
 @contextmanager

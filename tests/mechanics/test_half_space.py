@@ -2,14 +2,11 @@
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.integrate import quad
 from scipy.special import ellipe, ellipk, j0, j1
 
 from memscal.mechanics.film_response import hat_transform
 from memscal.mechanics.surface import coupling_integrals, singular_integrals
-
-FloatArray = NDArray[np.float64]
 
 EVEN = np.linspace(0.0, 1.0, 41)
 CROWDED = 1 - np.linspace(1.0, 0.0, 60) ** 4
