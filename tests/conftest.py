@@ -37,6 +37,14 @@ REMEMBERING = ("memscal.mechanics.solver.refinement", "memscal.extensions.finite
 
 FULL_STUDY = bool(os.environ.get("MEMSCAL_FULL_STUDY"))
 
+MARKERS = {
+    "accuracy": "accuracy",
+    "benchmarks": "benchmark",
+    "judges": "judges",
+    "pages": "pages",
+}
+"""Folders whose tests have sessions of their own, and their markers."""
+
 
 def pytest_report_header():
     """Say in the head of a report what is not run."""
@@ -45,7 +53,10 @@ def pytest_report_header():
 
 
 def pytest_collection_modifyitems(config, items):
-    """Deselect the studies that have no reduced form."""
+    """Mark what has a session of its own, and deselect the studies without a reduced form."""
+    for item in items:
+        if item.path.parent.name in MARKERS:
+            item.add_marker(MARKERS[item.path.parent.name])
     full = [item for item in items if item.get_closest_marker("full_study") and not FULL_STUDY]
     config.hook.pytest_deselected(items=full)
     items[:] = [item for item in items if item not in full]

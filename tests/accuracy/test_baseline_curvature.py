@@ -16,8 +16,6 @@ from scipy.stats import norm
 
 import memscal
 
-pytestmark = pytest.mark.accuracy
-
 SEEDS = 40 if FULL else 10
 CHANCE = 1e-4
 METHODS = ("white-noise", "bayesian")

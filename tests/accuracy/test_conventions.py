@@ -19,8 +19,6 @@ import memscal
 from memscal import Plan
 from memscal.extensions.simulation.rod_scan import PAPER_FILM
 
-pytestmark = pytest.mark.accuracy
-
 SEEDS = 60 if FULL else 8
 MADE = 20 if FULL else 6
 CHANCE = 1e-4

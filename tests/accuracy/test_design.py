@@ -17,8 +17,6 @@ import memscal
 from memscal import Plan
 from memscal.extensions.simulation.rod_scan import PAPER_FILM
 
-pytestmark = pytest.mark.accuracy
-
 DESIGNS, SEEDS = (10, 40) if FULL else (2, 8)
 #: How near a prediction is to come.
 TOLERANCE = 0.15

@@ -15,8 +15,6 @@ from scipy.interpolate import RectBivariateSpline
 
 import memscal
 
-pytestmark = pytest.mark.accuracy
-
 RADIUS = 3.2e-3
 STEP = 0.5e-3
 FINER = 4

@@ -24,7 +24,6 @@ from scipy.stats import binom, chi2
 
 import memscal
 
-pytestmark = pytest.mark.accuracy
 LOG = logging.getLogger(__name__)
 
 CHANCE = 1e-5 if FULL else 1e-3  # of fewer seeds, so that what is wrong by much is still found

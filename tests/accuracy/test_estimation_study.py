@@ -32,8 +32,6 @@ from scipy.stats import norm
 
 import memscal
 
-pytestmark = pytest.mark.accuracy
-
 DOCS = Path(__file__).parent.parent.parent / "docs"
 NAMES = list(CASES) if FULL else REDUCED
 DISC = memscal.SmoothedDisc(0.8e-3, 0.05e-3)

@@ -17,8 +17,6 @@ from scipy.stats import binom
 import memscal
 from memscal.calibration.explanations import MISFITS
 
-pytestmark = pytest.mark.accuracy
-
 SEEDS = 20 if FULL else 1
 NOISES = (0.001, 0.005) if FULL else (0.001,)
 NAMED = 0.9

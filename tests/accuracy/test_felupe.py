@@ -19,7 +19,6 @@ from memscal.mechanics.solver.step import Load
 
 felupe = pytest.importorskip("felupe", reason="FElupe, the other program, is not installed")
 
-pytestmark = pytest.mark.accuracy
 
 H = 2.0
 A = 0.25

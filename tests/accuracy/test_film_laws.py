@@ -16,7 +16,7 @@ import memscal
 from memscal.extensions.simulation.rod_scan import PAPER_FILM
 from memscal.model.film import LAWS
 
-pytestmark = [pytest.mark.accuracy, pytest.mark.full_study]
+pytestmark = pytest.mark.full_study
 
 SEEDS = 200
 CHANCE = 1e-5

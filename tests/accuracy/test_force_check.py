@@ -15,8 +15,6 @@ from scipy.stats import binom
 import memscal
 from memscal.measurement.measure_stress import pooled_force
 
-pytestmark = pytest.mark.accuracy
-
 EXPERIMENTS = 60 if FULL else 2
 CHANCE = 1e-3 if FULL else 1e-2  # or two experiments would be allowed any number of alarms
 #: Repeats and loads that are known well enough to see five percent.

@@ -26,8 +26,6 @@ from memscal.friction.compare import channels_of, compare_measured, fit_together
 from memscal.friction.effective import fit_friction
 from memscal.friction.results import FrictionComparison
 
-pytestmark = pytest.mark.accuracy
-
 SEEDS = 400 if FULL else 12
 FEW = 50 if FULL else 3  # of coefficients that no interval is counted at
 FRICTIONS = (0.0, 0.1, 0.2) if FULL else (0.0, 0.2)

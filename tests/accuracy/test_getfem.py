@@ -29,8 +29,6 @@ PROGRAM = Path(getfem_sphere.__file__)
 # As good as infinite: the shear of a sticking contact stays below the pressure.
 STICKING = 1e3
 
-pytestmark = pytest.mark.accuracy
-
 
 @pytest.fixture(scope="module", autouse=True)
 def python():

@@ -18,8 +18,6 @@ from memscal.calibration.calibrate import uncertainties
 from memscal.calibration.stages import solve
 from memscal.deconvolution.division import WhiteNoise
 
-pytestmark = pytest.mark.accuracy
-
 CHANCE = 1e-5 if FULL else 1e-3
 SCANS, RUNS = (200, 200) if FULL else (3, 6)
 NUMBERS = ("conversion_constant", "gaussian_sigma", "gaussian_sigma_deconvolved", "fwhm")

@@ -24,7 +24,7 @@ from memscal.extensions.simulation.contact_scan import PAPER_LOADS, PAPER_SPHERE
 from memscal.extensions.simulation.rod_scan import PAPER_FILM
 from memscal.friction import calculated
 
-pytestmark = [pytest.mark.accuracy, pytest.mark.full_study]
+pytestmark = pytest.mark.full_study
 
 SEEDS = 40
 CHANCE = 1e-3

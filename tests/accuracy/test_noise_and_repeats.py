@@ -16,8 +16,6 @@ from scipy.stats import binom
 
 import memscal
 
-pytestmark = pytest.mark.accuracy
-
 RASTERS, OUTLIERS, REPEATS, GAINS = (64, 25, 150, 40) if FULL else (3, 4, 12, 4)
 HALF = 8e-3
 ERROR = 10e-6

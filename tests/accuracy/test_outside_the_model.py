@@ -28,8 +28,6 @@ from scipy.stats import binom, norm
 
 import memscal
 
-pytestmark = pytest.mark.accuracy
-
 PERTURBED = {
     "roundness": lambda size: elliptic(1 + size),
     "line_offset": lambda size: replace(ROUND, line_offset=size),

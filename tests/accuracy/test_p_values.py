@@ -22,8 +22,6 @@ from memscal.estimation.residuals import (
     steps_test,
 )
 
-pytestmark = pytest.mark.accuracy
-
 SEEDS = 400 if FULL else 16
 CHANCE = 1e-5
 NOISES = (0.003, 0.02)

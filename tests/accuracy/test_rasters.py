@@ -20,7 +20,6 @@ from skimage.restoration import wiener
 
 import memscal
 
-pytestmark = pytest.mark.accuracy
 LOG = logging.getLogger(__name__)
 
 SEEDS, SIZE = (20, {}) if FULL else (2, {"side": 41, "half": 5e-3})

@@ -17,8 +17,6 @@ from scipy.stats import binom, chi2
 import memscal
 from memscal.measurement import posterior
 
-pytestmark = pytest.mark.accuracy
-
 SEEDS, NOISES = (40, (0.002, 0.005, 0.01)) if FULL else (3, (0.002, 0.01))
 SIGMAS = 4.0
 CHANCE = 1e-4

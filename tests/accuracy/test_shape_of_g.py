@@ -12,8 +12,6 @@ from scipy.stats import binom, chi2
 import memscal
 from memscal.model.checks import FALSE_ALARM
 
-pytestmark = pytest.mark.accuracy
-
 SEEDS = 200 if FULL else 6
 CHANCE = 1e-5 if FULL else 1e-3  # of fewer seeds, so that what is wrong by much is still found
 NOISES = (0.001, 0.005, 0.02)

@@ -14,8 +14,6 @@ from helpers.scans import calibrated
 
 from memscal.calibration.calibrate import uncertainties
 
-pytestmark = pytest.mark.accuracy
-
 COUNT = 100 if FULL else 12
 """Scans without an alarm."""
 CHANCE = 1e-3

@@ -11,8 +11,6 @@ from helpers.outside_sphere import SPHERE
 from helpers.two_states import MEAN_RATIO, STATES, drawn, outcome, perturbed
 from scipy.stats import binom, chi2
 
-pytestmark = pytest.mark.accuracy
-
 SEEDS = 40 if FULL else 3
 FEW = 10 if FULL else 1
 CHANCE = 1e-3

@@ -17,8 +17,6 @@ from scipy.stats import chi2
 import memscal
 from memscal import ElasticFilm, Rod, Scan
 
-pytestmark = pytest.mark.accuracy
-
 SEEDS = 60 if FULL else 3
 CHANCE = 1e-5 if FULL else 1e-3
 NUMBERS = ("conversion_constant", "gaussian_sigma", "fwhm")

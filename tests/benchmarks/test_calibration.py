@@ -9,8 +9,6 @@ from scipy.optimize import curve_fit
 import memscal
 from memscal.axisymmetry.kernels import unit_gaussian
 
-pytestmark = pytest.mark.benchmark
-
 WIDTH = 16e-3
 
 

@@ -11,8 +11,6 @@ from memscal.mechanics.film_response import HankelFilm
 from memscal.mechanics.solver.path import follow
 from memscal.mechanics.solver.step import ContactProblem, Depth, Load
 
-pytestmark = pytest.mark.benchmark
-
 
 def contact_of_200_rings(friction):
     """The paper's sphere: 200 rings up to the contact radius at 2.75 N, and a few beyond."""

@@ -7,7 +7,6 @@ from pathlib import Path
 from statistics import median
 from time import process_time
 
-import pytest
 from helpers.machine import once, show
 from helpers.paper import FILM, SPHERE
 
@@ -15,8 +14,6 @@ import memscal
 from memscal.friction.calculated import amontons_family
 from memscal.mechanics.solver import refinement
 from memscal.mechanics.solver.refinement import solve_on_rings
-
-pytestmark = pytest.mark.benchmark
 
 UNCERTAIN = replace(FILM, thickness_uncertainty=2e-5)
 

@@ -22,7 +22,6 @@ from helpers.scans import plane_error
 
 import memscal
 
-pytestmark = pytest.mark.benchmark
 LOG = logging.getLogger(__name__)
 
 # A disc's error has two humps, where it is taken for a Gaussian and where it is not: few seeds

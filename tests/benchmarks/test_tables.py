@@ -1,13 +1,10 @@
 """Speed of importing tables: by their rows, and beside numpy's reader."""
 
 import numpy as np
-import pytest
 from helpers.machine import show, turns
 
 from memscal.formats.scan import read_scan, write_scan
 from memscal.formats.tables.scan import import_table
-
-pytestmark = pytest.mark.benchmark
 
 
 def table(folder, rows):

@@ -14,8 +14,6 @@ import memscal
 from memscal.extensions.certificate.laboratory import read_laboratory
 from memscal.model.scan import STATED_ERRORS
 
-pytestmark = pytest.mark.judges
-
 
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):

@@ -12,8 +12,6 @@ from helpers.scans import known_apparatus, pressed, simulate, sphere_scan
 import memscal
 from memscal.cli import main
 
-pytestmark = pytest.mark.pages
-
 DATA = Path(__file__).parents[2] / "calibration_data"
 KINDS = ("calibrate", "apply", "compare", "restore", "batch")
 #: A name that has no place to break, and text that a page must not take for its own.

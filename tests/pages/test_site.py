@@ -11,8 +11,6 @@ from pathlib import Path
 
 import pytest
 
-pytestmark = pytest.mark.pages
-
 DARK = ["docs/index", "docs/quality", "docs/method", "docs/commands", "docs/api/memscal.calibrate"]
 #: Of the pages of public names, which are made alike, these are read.
 NAMES = {f"docs/api/memscal.{name}" for name in ("calibrate", "Calibration", "FieldGrid")}
