@@ -186,6 +186,10 @@ _LEAST_CLOSER = 10.0
 #: largest signal.
 _OF_NOISE = 0.5
 _FLAT = 0.01
+#: A profile through the others that rises by less than this share of it tells no ceiling; where the
+#: fit is flat, by less than the second.
+_RISEN = 0.005
+_RISEN_OF_FLAT = 0.15
 #: Points are a plateau while their scatter has at least this p-value; this weight leaves them out.
 _ALIKE = 1e-3
 _LITTLE = 1e-9
@@ -234,11 +238,15 @@ def _risen_above(estimate: ProfileEstimate, plateau: BoolArray) -> bool:
     """Whether the profile through all other points rises above a plateau of a scan."""
     if plateau.sum() < FEWEST_AT_CEILING:
         return False
-    if np.ptp(estimate.predicted[plateau]) < _FLAT * estimate.largest_signal:
-        return False
+    outlier = estimate.outlier_weight
     model = estimate.model
     points = estimate.points
-    weights = np.where(plateau, _LITTLE, 1.0) * estimate.weights
+    least_rise = _RISEN
+    if np.ptp(estimate.predicted[plateau]) < _FLAT * estimate.largest_signal:
+        # It may be so for it follows a clipped top, and leaves out as outliers what is beside it.
+        least_rise = _RISEN_OF_FLAT
+        outlier = np.ones_like(outlier)
+    weights = np.where(plateau, _LITTLE, outlier / estimate.outlier_weight) * estimate.weights
     chosen = np.arange(plateau.size)
     if plateau.size > 2 * _ENOUGH and points.decorrelation is None:
         # Some of the plateau, and of the others.
@@ -254,7 +262,7 @@ def _risen_above(estimate: ProfileEstimate, plateau: BoolArray) -> bool:
     angular = estimate.basis.angular
     reduced = ReducedScan.of(model, fit, weights, angular.components if angular else None)
     basis = departure_basis(fit, reduced, angular)
-    count = (estimate.outlier_weight * ~plateau)[chosen].sum()
+    count = (outlier * ~plateau)[chosen].sum()
     least = 1.0 if points.u_errors is not None else NUMERICAL_FLOOR * estimate.largest_signal
     weighed = weigh_departures(reduced, basis, count, least_noise=least).average()
     # Mean over the plateau of the prediction less the voltage, and its standard uncertainty.
@@ -262,7 +270,8 @@ def _risen_above(estimate: ProfileEstimate, plateau: BoolArray) -> bool:
     overshoot = -(share @ weighed.residual)
     slope = reduced.summed(share) @ basis.columns(reduced)
     variance = share**2 @ estimate.noise[chosen] ** 2 + slope @ weighed.covariance @ slope
-    return bool(overshoot > -ndtri(FALSE_ALARM) * np.sqrt(variance))
+    least = max(-ndtri(FALSE_ALARM) * np.sqrt(variance), least_rise * estimate.largest_signal)
+    return bool(overshoot > least)
 
 
 def _plateau(estimate: ProfileEstimate, inside: BoolArray) -> BoolArray:

@@ -91,8 +91,10 @@ _FEW_OF_LINE = 0.1
 _FEW_OF_RASTER = 0.003
 #: So many readings at the top, which agree within this share of the steps to the next ones, half as
 #: many, may be at a ceiling; and more that agree so many times less closely, or to so many digits.
+#: Within the larger share they look so where a calibration is refused.
 FEWEST_AT_CEILING = 3
-_AGREEING = 0.07
+_AGREEING = 0.05
+_LOOKING_SO = 0.07
 _AS_ALIKE = 5.0
 #: The least step of readings is of so few of their last digit, of which all are multiples, to this
 #: share of it.
@@ -505,7 +507,9 @@ def ordinary_readings(points: ScanPoints) -> BoolArray:
     return ordinary
 
 
-def agreeing_tops(u: FloatArray) -> tuple[IndexArray, IndexArray, FloatArray]:
+def agreeing_tops(
+    u: FloatArray, share: float = _AGREEING
+) -> tuple[IndexArray, IndexArray, FloatArray]:
     """Order readings (n,) from the highest, and say how many of the first may be at a ceiling.
 
     With how far each is from the highest, at least a digit.
@@ -515,7 +519,7 @@ def agreeing_tops(u: FloatArray) -> tuple[IndexArray, IndexArray, FloatArray]:
     apart = np.maximum(ordered[0] - ordered, _last_digit(u))
     count = np.arange(FEWEST_AT_CEILING, max(2 * (u.size - 1) // 3, FEWEST_AT_CEILING))
     steps = ordered[count - 1] - ordered[count + count // 2]
-    count = count[ordered[0] - ordered[count - 1] <= _AGREEING * steps]
+    count = count[ordered[0] - ordered[count - 1] <= share * steps]
     alike = apart[count - 1] <= _AS_ALIKE * apart[count[:1] - 1]
     return falling, count[alike], apart
 
@@ -524,7 +528,7 @@ def clipped_looks(u: FloatArray) -> FloatArray:
     """Return the highest readings that look as if held at a ceiling, none where none do."""
     if u.size < 2 * FEWEST_AT_CEILING or not np.ptp(u):
         return u[:0]
-    falling, counts, _ = agreeing_tops(u)
+    falling, counts, _ = agreeing_tops(u, _LOOKING_SO)
     return u[falling[: counts.max(initial=0)]]
 
 
