@@ -73,6 +73,9 @@ def naming_ceiling(scans: Sequence[Scan], channel: str) -> Iterator[None]:
 
 def _clipped(scan: Scan) -> str:
     """Say which readings of a scan look clipped, or how many are left out; nothing where none."""
+    if scan.at_ceiling:
+        text = at_ceiling_text(round(scan.at_ceiling))
+        return f"{text} The others may not tell A: measure with a lower gain or load."
     reading = scan.reading
     top = clipped_looks(scan.u_zz[np.isfinite(scan.u_zz)])
     if top.size:
@@ -83,9 +86,6 @@ def _clipped(scan: Scan) -> str:
             "If amplifier or converter was at its end there, leave them out (memscal import "
             f"--ceiling VALUE, {ceiling}), or measure with a lower gain or load."
         )
-    if scan.at_ceiling:
-        text = at_ceiling_text(round(scan.at_ceiling))
-        return f"{text} The others may not tell A: measure with a lower gain or load."
     return ""
 
 
