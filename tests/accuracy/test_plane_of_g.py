@@ -103,5 +103,5 @@ def test_what_is_left_out_for_size_is_said(monkeypatch: pytest.MonkeyPatch) -> N
     scan = raster("two near", 0)
     found = memscal.calibrate(scan, reference="disc:3.2mm", method="bayesian", other=False)
     texts = [m.text for m in found.apparatus.process.messages if m.kind == "plane"]
-    assert "1,600 readings" in texts[0]
+    assert f"{SIDE**2:,} readings" in texts[0]
     assert "at most 1,000" in texts[0]
