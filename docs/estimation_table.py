@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 
 import numpy as np
+from helpers.bounds import root_mean_square
 from helpers.estimation_study import (
     BANDS,
     CASES,
@@ -29,7 +30,6 @@ from helpers.estimation_study import (
     RADII,
     mean_coverage,
     mean_efficiency,
-    root_mean_square,
     study,
 )
 

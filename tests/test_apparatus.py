@@ -4,14 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from helpers.bounds import FULL
+from helpers.bounds import FULL, root_mean_square, root_mean_square_range
 from helpers.builders import CONVERSION, SIGMA, make_artifact
 from helpers.machine import assert_same_to_rounding
 from helpers.scans import EXACT_FILM, EXACT_ROD, TAILS, as_function, simulate
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import dblquad
-from scipy.stats import chi2, ncx2, norm
+from scipy.stats import ncx2, norm
 
 import memscal
 from memscal.axisymmetry.kernels import unit_gaussian
@@ -276,9 +276,9 @@ def test_the_uncertainty_of_a_prediction_is_that_of_many_calibrations():
         stated.append(apparatus.predict_uncertainty(r, stress)[:60:6])
         blurred.append(apparatus.convolve_uncertainty(r, stress)[:60:6])
     scatter = np.std(predicted, axis=0, ddof=1)
-    said = np.sqrt(np.mean(np.square(stated), axis=0))
+    said = root_mean_square(stated)
     # What is stated also counts what does not scatter; a standard deviation is known to so much.
-    chance = np.sqrt(chi2.isf([1 - 1e-5, 1e-5], DRAWS - 1) / (DRAWS - 1))
+    chance = root_mean_square_range(DRAWS - 1, 1e-5)
     assert np.all(scatter < 1.1 * chance[1] * said)
     assert np.all(said < 1.8 / chance[0] * scatter)
     # A alone, as if it were independent of G, would say more than is true on the axis.

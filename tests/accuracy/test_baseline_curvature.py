@@ -8,10 +8,10 @@ from functools import cache
 
 import numpy as np
 import pytest
-from helpers.bounds import FULL
+from helpers.bounds import FULL, deviates
 from helpers.outside import ROUND
 from helpers.outside import scan as perturbed_scan
-from helpers.outside_study import TRUTHS, deviates
+from helpers.outside_study import TRUTHS
 from scipy.stats import norm
 
 import memscal
@@ -34,7 +34,7 @@ def found(method, parabola, held):
             scan = replace(scan, baseline_curvature_uncertainty=0.0)
         apparatus = memscal.calibrate(scan, method=method, other=False).apparatus
         p = apparatus.parameters
-        z.append(deviates(p))
+        z.append(deviates(p, TRUTHS))
         u.append([p.uncertainty(name) / truth for name, truth in TRUTHS.items()])
         passed.append(apparatus.passed)
     return np.array(z), np.array(u), np.array(passed)

@@ -9,11 +9,10 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 from accuracy.test_design import scan_of
-from helpers.bounds import FULL
+from helpers.bounds import FULL, deviates, root_mean_square, root_mean_square_limit
 from helpers.direct import direct_scan
-from helpers.outside_study import deviates
 from helpers.scans import CONVERSION, GAUSSIAN, SIGMA, TAILS, simulate
-from scipy.stats import chi2, norm
+from scipy.stats import norm
 
 import memscal
 from memscal import Plan
@@ -67,7 +66,7 @@ def direct(law, stated):
 def test_rubber_whose_law_is_not_stated_is_right(method):
     z = deviations(direct("neo-hookean", ""), method=method)
     assert np.all(np.abs(z.mean(axis=0)) < 0.8 + margin(z))
-    assert np.all(np.sqrt(np.mean(z**2, axis=0)) < 1.3 * np.sqrt(chi2.isf(CHANCE, SEEDS) / SEEDS))
+    assert np.all(root_mean_square(z) < root_mean_square_limit(1.3, SEEDS, CHANCE))
 
 
 @pytest.mark.parametrize("method", ["white-noise", "bayesian"])
@@ -102,10 +101,10 @@ def test_the_full_width_by_a_window_is_that_of_g(name, noise):
         scan = direct_scan(kernel, noise=noise, seed=seed)
         p = memscal.calibrate(scan, other=False).apparatus.parameters
         found.append([p["fwhm"] / width - 1])
-        errors.append([(p["fwhm"] - width) / p.uncertainty("fwhm")])
+        errors += deviates(p, {"fwhm": width})
     # Without the correction it is 5 to 17 % too large.
     assert abs(np.mean(found)) < 0.02 + margin(np.array(found))[0]
-    assert np.sqrt(np.mean(np.square(errors))) < np.sqrt(chi2.isf(CHANCE, SEEDS) / SEEDS)
+    assert root_mean_square(errors) < root_mean_square_limit(1.0, SEEDS, CHANCE)
 
 
 #: The default and five others, of which some state what scans take for granted.

@@ -9,9 +9,8 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
-from helpers.bounds import FULL
+from helpers.bounds import FULL, root_mean_square, root_mean_square_range
 from helpers.scans import simulate
-from scipy.stats import chi2
 
 import memscal
 from memscal import Plan
@@ -114,16 +113,14 @@ def margin(values):
 @pytest.mark.parametrize("number", range(DESIGNS))
 def test_predicted_uncertainties_are_those_that_calibrations_state(number):
     found = study(number)
-    ratio = found.predicted / np.sqrt(np.mean(found.stated**2, axis=0))
+    ratio = found.predicted / root_mean_square(found.stated)
     allowed = TOLERANCE + DEVIATIONS * margin(found.stated)
     assert np.all(np.abs(ratio - 1) < allowed), (ratio, allowed)
 
 
 def test_over_all_designs_the_prediction_is_right_on_average():
     # What one design's seeds leave open, all of them settle.
-    ratio = np.array(
-        [s.predicted / np.sqrt(np.mean(s.stated**2, axis=0)) for s in map(study, range(DESIGNS))]
-    )
+    ratio = np.array([s.predicted / root_mean_square(s.stated) for s in map(study, range(DESIGNS))])
     spread = np.array([margin(study(n).stated) for n in range(DESIGNS)])
     sampling = DEVIATIONS * np.sqrt(np.sum(spread**2, axis=0)) / DESIGNS
     assert np.all(np.abs(ratio.mean(axis=0) - 1) < TOLERANCE / 2 + sampling)
@@ -136,5 +133,5 @@ def test_nothing_scatters_more_than_noise_and_prior_together_allow(number):
     # departures that a Gaussian has not: over ten designs by 0.57, 1.01 and 0.19 of it.
     found = study(number)
     ratio = np.std(found.found, axis=0, ddof=1) / found.own
-    low, high = np.sqrt(chi2.ppf([CHANCE, 1 - CHANCE], SEEDS - 1) / (SEEDS - 1))
+    low, high = root_mean_square_range(SEEDS - 1, CHANCE)
     assert np.all((LEAST * low < ratio) & (ratio < high)), ratio

@@ -11,16 +11,22 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
-from helpers.bounds import FULL, cramer_rao, root_mean_square_limit
+from helpers.bounds import (
+    FULL,
+    cramer_rao,
+    deviates,
+    root_mean_square,
+    root_mean_square_limit,
+    root_mean_square_range,
+)
 from helpers.estimation_study import (
     Case,
     Limits,
     Outcome,
     errors_of,
-    root_mean_square,
 )
 from helpers.scans import CENTRE, CONVERSION, RING, SIGMA, TAILS, added_ring, simulated
-from scipy.stats import binom, chi2
+from scipy.stats import binom
 
 import memscal
 
@@ -83,7 +89,7 @@ def study(case):
             {
                 **errors_of(case, seed, apparatus),
                 "agreement": agreement(apparatus).value,
-                "z": [(p[name] - truth) / p.uncertainty(name) for name, truth in truths.items()],
+                "z": deviates(p, truths),
                 "fit": [p[name] / truth - 1 for name, truth in fitted.items()],
                 "u_fit": [p.uncertainty(name) / truth for name, truth in fitted.items()],
             }
@@ -119,7 +125,7 @@ def test_the_fit_reaches_its_bound_and_states_what_it_scatters_by(case):
     assert (root_mean_square(error) < limit * bound).all()
     # The bound is what an efficient estimate truly scatters by, free of sampling error.
     assert root_mean_square(stated) == pytest.approx(bound, rel=0.15)
-    low, high = np.sqrt(chi2.isf([1 - CHANCE, CHANCE], seeds) / seeds)
+    low, high = root_mean_square_range(seeds, CHANCE)
     scatter = root_mean_square(error / stated)
     assert (low / 1.15 < scatter).all()
     assert (scatter < high * 1.15).all()
@@ -152,14 +158,14 @@ def test_a_ring_that_only_the_division_follows_is_told():
 
 
 def test_a_raster_scatters_by_no_more_than_is_stated():
-    deviates = []
+    z = []
     seeds = range(50 if FULL else 2)  # a raster costs as much as twenty lines
     for seed in seeds:
         scan = simulated(raster=True, points=25, seed=seed, centre=(0.3e-3, -0.2e-3))
         p = memscal.calibrate(scan).apparatus.parameters
         truths = {"conversion_constant": CONVERSION, "gaussian_sigma": SIGMA, "centre_y": -0.2e-3}
-        deviates.append([(p[n] - truth) / p.uncertainty(n) for n, truth in truths.items()])
-    scatter = np.sqrt(np.mean(np.square(deviates), axis=0))
+        z.append(deviates(p, truths))
+    scatter = root_mean_square(z)
     assert (scatter < root_mean_square_limit(1.15, len(seeds), CHANCE)).all()
 
 
@@ -186,17 +192,18 @@ def test_repeats_that_share_their_centre_are_told_apart_as_rarely_as_is_said():
 
 def test_repeats_that_moved_have_centres_of_their_own_within_their_uncertainties():
     shift = 40e-6
-    names = ("conversion_constant_gaussian", "gaussian_sigma", "centre", "centre_3")
-    truths = np.array([CONVERSION, WIDTHS[0.005], CENTRE - shift, CENTRE + shift])
-    deviates = []
+    truths = {"conversion_constant_gaussian": CONVERSION, "gaussian_sigma": WIDTHS[0.005]}
+    truths |= {"centre": CENTRE - shift, "centre_3": CENTRE + shift}
+    z = []
     for seed in range(PASSES):
         own, one = (of_repeats(0.005, seed, shift, centre=choice) for choice in (None, "common"))
         p = own.parameters
         assert own.process.configuration["centre"]["choice"] == "per-repeat"
-        deviates.append([(p[n] - t) / p.uncertainty(n) for n, t in zip(names, truths, strict=True)])
+        z.append(deviates(p, truths))
         # With one centre the flanks of the others count as noise and outliers.
-        assert p.uncertainty(names[0]) < 0.8 * one.parameters.uncertainty(names[0])
+        name = "conversion_constant_gaussian"
+        assert p.uncertainty(name) < 0.8 * one.parameters.uncertainty(name)
         assert "repeat_centres" in {check.name for check in one.checks if not check.passed}
-    squares = np.sum(np.square(deviates), axis=0)
-    low, high = chi2.isf([1 - CHANCE, CHANCE], PASSES)
-    assert np.all((low < squares) & (squares < high))
+    low, high = root_mean_square_range(PASSES, CHANCE)
+    scatter = root_mean_square(z)
+    assert np.all((low < scatter) & (scatter < high))

@@ -8,9 +8,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from helpers.bounds import root_mean_square, root_mean_square_range
 from helpers.direct import LOADS, RATIO, direct_scan
 from helpers.scans import GAUSSIAN, TAILS
-from scipy.stats import binom, chi2, norm
+from scipy.stats import binom, norm
 
 import memscal
 from memscal.extensions.simulation.rod_scan import PAPER_FILM
@@ -92,5 +93,5 @@ def test_an_estimated_thickness_is_off_by_what_it_states(law, setting, sensor):
     # Of one sensor the mean is off by its shape, of all sensors of the prior it is not.
     bias = {"Gaussian": 0.2, "disc": 0.7, "tails": 0.7}[sensor]
     assert abs(np.mean(error / left)) < bias + norm.isf(CHANCE) / np.sqrt(SEEDS)
-    high, low = (1.3, 0.6) * np.sqrt(chi2.isf([CHANCE, 1 - CHANCE], SEEDS) / SEEDS)
-    assert low < np.sqrt(np.mean((error / left) ** 2)) < high
+    low, high = (0.6, 1.3) * root_mean_square_range(SEEDS, CHANCE)
+    assert low < root_mean_square(error / left) < high

@@ -10,8 +10,7 @@ from functools import lru_cache
 import numpy as np
 import pytest
 from accuracy.test_division import CASES as SENSORS
-from helpers.bounds import FULL
-from scipy.stats import chi2
+from helpers.bounds import FULL, root_mean_square, root_mean_square_range
 
 import memscal
 from memscal.calibration.calibrate import uncertainties
@@ -61,9 +60,8 @@ def deviates(case, split):
 
 
 def require_unit(deviates, route, of_shape=(0.8, 1.2)):
-    ratio = np.sqrt(np.mean(deviates[:, ROUTES.index(route)] ** 2, axis=0))
-    count = len(deviates)
-    low, high = np.sqrt(chi2.isf([1 - CHANCE, CHANCE], count) / count)
+    ratio = root_mean_square(deviates[:, ROUTES.index(route)])
+    low, high = root_mean_square_range(len(deviates), CHANCE)
     least = np.full(ratio.size, 0.8)
     most = np.full(ratio.size, 1.2)
     least[NUMBERS.index("fwhm") :], most[NUMBERS.index("fwhm") :] = of_shape

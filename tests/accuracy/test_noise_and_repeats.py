@@ -8,9 +8,8 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
-from helpers.bounds import FULL, RARE, root_mean_square_limit
+from helpers.bounds import FULL, RARE, deviates, root_mean_square, root_mean_square_limit
 from helpers.outside import ROUND, SIGMA, A, line, scan
-from helpers.outside_study import deviates
 from scipy.interpolate import make_interp_spline
 from scipy.stats import binom
 
@@ -58,7 +57,7 @@ def test_outliers_move_a_division_by_its_uncertainty_from_the_truth_and_the_othe
         bayesian = apparatus.other.parameters["conversion_constant"]
         error = apparatus.conversion_constant - np.array([A, bayesian])
         off.append(error / apparatus.parameters.uncertainty("conversion_constant"))
-    rms = np.sqrt(np.mean(np.square(off), axis=0))
+    rms = root_mean_square(off)
     assert (rms < root_mean_square_limit(1.0, OUTLIERS, RARE)).all()
 
 
@@ -83,7 +82,7 @@ def test_errors_of_positions_are_as_stated(anew):
         )
         found = memscal.calibrate(made).apparatus.parameters
         off.append(deviates(found, {"gaussian_sigma": SIGMA, "centre": 0.0}))
-    rms = np.sqrt(np.mean(np.square(off), axis=0))
+    rms = root_mean_square(off)
     assert (rms < root_mean_square_limit(1.1, REPEATS, RARE)).all()
     assert (rms > (0.7 if FULL else 0.4)).all()
     assert np.mean(np.abs(off) < 2) >= binom.ppf(RARE, 2 * REPEATS, 0.95) / (2 * REPEATS)
@@ -102,5 +101,5 @@ def test_gains_that_vary_between_repeats_are_estimated_and_counted():
         found = memscal.calibrate(replace(made, load_uncertainty=None), other=False).apparatus
         off.append(deviates(found.parameters, dict.fromkeys(names, A)))
         assert 0 < found.budget["conversion_constant"]["between_repeats"] < 0.025 * A
-    rms = np.sqrt(np.mean(np.square(off), axis=0))
+    rms = root_mean_square(off)
     assert (rms < root_mean_square_limit(1.2, GAINS, RARE)).all()

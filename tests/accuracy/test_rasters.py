@@ -11,7 +11,7 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
-from helpers.bounds import FULL
+from helpers.bounds import FULL, root_mean_square
 from helpers.rasters import CENTRE, WIDTH, TailedEllipse, tailed_raster
 from helpers.scans import CONVERSION
 from scipy.interpolate import CloughTocher2DInterpolator, NearestNDInterpolator, RectBivariateSpline
@@ -52,10 +52,6 @@ def true_g(apparatus):
     return np.asarray(TailedEllipse().at(x[None, :], y[:, None])[INSIDE])
 
 
-def rms(values):
-    return float(np.sqrt(np.mean(values**2)))
-
-
 @pytest.mark.parametrize("method", METHODS)
 def test_halves_of_a_raster_differ_as_their_uncertainty_says(method):
     of_noise = []
@@ -69,19 +65,19 @@ def test_halves_of_a_raster_differ_as_their_uncertainty_says(method):
         difference = on_plane(first, "g") - on_plane(second, "g")
         for name, ratios in (("g_scatter", of_noise), ("g_errors", of_all)):
             both = np.hypot(on_plane(first, name), on_plane(second, name))
-            ratios.append(rms(difference / both))
+            ratios.append(root_mean_square(difference / both))
         for half in (first, second):
             error = on_plane(half, "g") - true_g(half)
             truth = true_g(half)
-            of_truth.append(rms(error / on_plane(half, "g_errors")))
-            relative.append(rms(error) / rms(truth))
+            of_truth.append(root_mean_square(error / on_plane(half, "g_errors")))
+            relative.append(root_mean_square(error) / root_mean_square(truth))
             a = half.conversion_constant
             u = half.parameters.uncertainty("conversion_constant")
             deviates.append((a - CONVERSION) / u)
             outliers.append(sum(m.kind == "outlier" for m in half.process.messages))
     names = "noise", "all", "truth", "relative error", "deviates of A"
     figures = [np.mean(v) for v in (of_noise, of_all, of_truth, relative)] + [
-        rms(np.array(deviates))
+        root_mean_square(deviates)
     ]
     LOG.info("%s: %s", method, {n: f"{v:.3f}" for n, v in zip(names, figures, strict=True)})
     assert 0.7 < np.mean(of_noise) < 1.3
@@ -153,4 +149,4 @@ def residual(scan, held, volts):
     plane = np.stack([np.ones_like(x), x, y], axis=-1)
     left = scan.u_zz - volts
     drift = np.linalg.lstsq(plane[~held], left[~held], rcond=None)[0]
-    return rms((left - plane @ drift)[held])
+    return root_mean_square((left - plane @ drift)[held])

@@ -5,9 +5,9 @@ Set MEMSCAL_FULL_STUDY for 200 seeds in place of 6.
 
 import numpy as np
 import pytest
-from helpers.bounds import FULL
+from helpers.bounds import FULL, root_mean_square, root_mean_square_range
 from helpers.scans import RING, TAILS, simulated
-from scipy.stats import binom, chi2
+from scipy.stats import binom
 
 import memscal
 from memscal.model.checks import FALSE_ALARM
@@ -45,7 +45,7 @@ def test_what_no_window_divides_scatters_by_half_to_twice_what_is_stated():
         off = abs(np.log2(apparatus.parameters["fwhm"] / (2.355 * 0.9e-3))) > 1
         assert not (off and apparatus.passed)
     ratio = np.std(values, axis=0, ddof=1) / np.median(stated, axis=0)
-    low, high = np.sqrt(chi2.isf([1 - CHANCE, CHANCE], count - 1) / (count - 1))
+    low, high = root_mean_square_range(count - 1, CHANCE)
     # What is stated of G counts what every scan hides, too: at some radii ten times the scatter.
-    assert min(*ratio[:2], np.sqrt(np.mean(ratio[2:] ** 2))) > low / 2
+    assert min(*ratio[:2], root_mean_square(ratio[2:])) > low / 2
     assert (ratio < 2 * high).all()

@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from helpers.bounds import FULL, root_mean_square_limit
+from helpers.bounds import FULL, deviates, root_mean_square, root_mean_square_limit
 from helpers.outside import FILM, ROUND, A, correlated, line, scan
-from helpers.outside_study import TRUTHS, deviates
+from helpers.outside_study import TRUTHS
 from helpers.scans import calibrated
 
 from memscal.calibration.calibrate import uncertainties
@@ -42,7 +42,7 @@ WHITE = correlated(0.0, 0.0, 0.005)
 def errors(calibration):
     """Errors of A by both routes and of sigma over their stated uncertainties."""
     apparatus = calibration.apparatus
-    found = dict(zip(TRUTHS, deviates(apparatus.parameters), strict=True))
+    found = dict(zip(TRUTHS, deviates(apparatus.parameters, TRUTHS), strict=True))
     assert apparatus.other is not None
     found["bayesian"] = deviates(apparatus.other.parameters, {"conversion_constant": A})[0]
     return found
@@ -63,7 +63,7 @@ def test_slow_noise_is_counted_in_scans_without_an_alarm(noise, step):
         if calibration.passed:
             found.append(errors(calibration))
     for name in found[0]:
-        rms = np.sqrt(np.mean([each[name] ** 2 for each in found]))
+        rms = root_mean_square([each[name] for each in found])
         # 1.3 is asked for over a hundred.
         limit = 1.3 if FULL else root_mean_square_limit(1.3, COUNT, CHANCE)
         assert rms < limit, (name, rms, seed)

@@ -5,19 +5,19 @@ Set MEMSCAL_FULL_STUDY for more seeds.
 
 import numpy as np
 import pytest
-from helpers.bounds import FULL, root_mean_square_limit
+from helpers.bounds import FULL, root_mean_square, root_mean_square_limit, root_mean_square_range
 from helpers.outside import FILM, elliptic, tail
 from helpers.outside_sphere import SPHERE
 from helpers.two_states import MEAN_RATIO, STATES, drawn, outcome, perturbed
-from scipy.stats import binom, chi2
+from scipy.stats import binom
 
 SEEDS = 40 if FULL else 3
 FEW = 10 if FULL else 1
 CHANCE = 1e-3
 
 
-def root_mean_square(outcomes):
-    return float(np.sqrt(np.mean([one.deviation**2 for one in outcomes])))
+def rms(outcomes):
+    return root_mean_square([one.deviation for one in outcomes])
 
 
 def test_what_the_two_states_do_not_share_is_counted():
@@ -32,7 +32,7 @@ def test_what_the_two_states_do_not_share_is_counted():
     for case in cases:
         found += [perturbed(case[0], seed, *case[1:]) for seed in range(SEEDS)]
     # The experiments of one seed share their noise.
-    assert root_mean_square(found) < root_mean_square_limit(1.4, SEEDS, CHANCE)
+    assert rms(found) < root_mean_square_limit(1.4, SEEDS, CHANCE)
 
 
 def test_the_uncertainty_of_equal_states_stays_small():
@@ -66,15 +66,15 @@ def test_what_both_states_share_cancels(name):
     if name.startswith(("gain", "loads")):
         worlds["rod"] = {"poisson_ratio": MEAN_RATIO}
     found = [outcome(0.0, seed, worlds, radius) for seed in range(FEW)]
-    assert root_mean_square(found) < root_mean_square_limit(1.5, FEW, CHANCE)
+    assert rms(found) < root_mean_square_limit(1.5, FEW, CHANCE)
 
 
 @pytest.mark.parametrize("lubricated", [0.0, 0.02])
 def test_the_interval_holds_where_all_is_drawn_from_what_is_stated(lubricated):
     found = [drawn(lubricated, seed) for seed in range(SEEDS)]
     assert sum(one.held for one in found) >= binom.ppf(CHANCE, SEEDS, 0.93)
-    low, high = np.sqrt(chi2.ppf([CHANCE, 1 - CHANCE], SEEDS) / SEEDS)
-    assert 0.7 * low < root_mean_square(found) < 1.3 * high
+    low, high = root_mean_square_range(SEEDS, CHANCE)
+    assert 0.7 * low < rms(found) < 1.3 * high
 
 
 @pytest.mark.full_study

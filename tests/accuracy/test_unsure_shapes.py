@@ -10,9 +10,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from helpers import outside
-from helpers.bounds import FULL
+from helpers.bounds import FULL, root_mean_square, root_mean_square_range
 from helpers.outside import Part, World
-from scipy.stats import chi2
 
 import memscal
 from memscal import ElasticFilm, Rod, Scan
@@ -78,8 +77,8 @@ def test_halves_of_few_places_differ_by_noise_and_baseline_and_share_the_rest(ki
         told = [m.text for m in found[0].process.messages if m.kind == "form_of_g"]
         mostly = (shares[-1] > 2)[[0, 2]]
         assert [f"% of {w} (" in "".join(told) for w in ("A", "the full width")] == [*mostly]
-    least, most = np.sqrt(chi2.isf([1 - CHANCE, CHANCE], SEEDS) / SEEDS)
-    ratio = np.sqrt(np.mean(np.square(z), axis=0))
+    least, most = root_mean_square_range(SEEDS, CHANCE)
+    ratio = root_mean_square(z)
     # The width of a disc's Gaussian depends on the places: its line is misfit.
     compared = np.array([True, kind != "disc", True])
     assert (ratio > 0.45 * least)[compared].all()
@@ -108,4 +107,4 @@ def test_a_clear_flat_top_is_given_with_its_uncertainty_or_refused_with_numbers(
         number = re.search(r"([\d.]+) (?:of all that|standard uncertainties, those)", refusal)
         assert float(number[1]) <= 3.0
     assert len(given) >= 0.5 * SEEDS
-    assert np.sqrt(np.mean(np.square(given))) < 2.0
+    assert root_mean_square(given) < 2.0

@@ -4,7 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from helpers.bounds import FULL, assert_as_stated, cramer_rao
+from helpers.bounds import (
+    FULL,
+    assert_as_stated,
+    cramer_rao,
+    root_mean_square,
+    root_mean_square_range,
+)
 from helpers.scans import (
     CONVERSION,
     EXACT_FILM,
@@ -15,14 +21,13 @@ from helpers.scans import (
     simulate,
     simulated,
 )
-from scipy.stats import chi2
 
 import memscal
 from memscal.errors import InputError
 from memscal.model.scan import StressSensor
 
 SEEDS = 60 if FULL else 12
-LOW, HIGH = np.sqrt(chi2.isf([1 - 1e-5, 1e-5], SEEDS) / SEEDS)
+LOW, HIGH = root_mean_square_range(SEEDS, 1e-5)
 
 
 def joint(scans, method="bayesian", **options):
@@ -190,7 +195,7 @@ def test_noise_that_is_correlated_is_weighed_as_such():
             found.append(((p[name] - SIGMA) / p.uncertainty(name), p[name] - SIGMA))
     stated = np.array(stated)
     naive = np.array(naive)
-    assert LOW / 1.1 < np.sqrt(np.mean(stated[:, 0] ** 2)) < HIGH * 1.1
+    assert LOW / 1.1 < root_mean_square(stated[:, 0]) < HIGH * 1.1
     assert np.std(stated[:, 1]) < np.std(naive[:, 1])
 
 

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from helpers.bounds import RARE
-from scipy.stats import chi2, gamma
+from helpers.bounds import RARE, root_mean_square_range
+from scipy.stats import gamma
 
 from memscal.axisymmetry.grids import EvenGrid, Lattice
 from memscal.axisymmetry.kernels import unit_gaussian
@@ -66,7 +66,7 @@ def test_the_noise_has_the_spectral_amplitude_that_it_claims(amplitude, seed):
     image = WhiteNoiseDraw(amplitude=amplitude, seed=seed).divide(problem).field
     spectrum = np.fft.fft2(image) * grid.cell_area
     s = amplitude * 0.1 * 7e-3
-    low, high = chi2.ppf([RARE, 1 - RARE], 101**2) / 101**2
+    low, high = root_mean_square_range(101**2, RARE) ** 2
     assert low < np.mean(np.abs(spectrum) ** 2) / s**2 < high
     # White: within a circle of wave vectors there is as much of it as outside.
     frequency = np.fft.fftfreq(101)

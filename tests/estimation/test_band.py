@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from helpers.bounds import root_mean_square
 from helpers.scans import RING, TAILS, estimated, simulated
 
 import memscal
@@ -52,7 +53,7 @@ def test_within_the_band_the_transfer_function_is_known_to_a_third_and_beyond_it
         gaussian = np.exp(-0.5 * (k[i] * estimate.gaussian.sigma) ** 2)
         found = estimate.kernel[i] / estimate.conversion_constant
         errors.append((found - kernel.transform(k[i])) / gaussian)
-    within, beyond = np.sqrt(np.mean(np.square(errors), axis=0))
+    within, beyond = root_mean_square(errors)
     # A mean square of 8 exceeds 3.3 times its expectation once in a thousand; stated is a ninth.
     assert within < 1 / 3
     assert beyond > 1 / 3

@@ -4,10 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from helpers.bounds import FULL
+from helpers.bounds import FULL, root_mean_square, root_mean_square_range
 from helpers.rasters import CENTRE, TailedEllipse, clean_raster, tailed_raster
 from helpers.scans import CONVERSION, SIGMA, estimated, simulated
-from scipy.stats import chi2
 
 import memscal
 from memscal.axisymmetry.kernels import unit_gaussian
@@ -78,8 +77,8 @@ def test_an_ellipse_is_found_with_an_uncertainty_that_is_true():
         variance = np.diag(fit.covariance(estimate.weights, estimate.noise_scale))
         rows.append([[*fit.ellipticity, fit.sigma], np.sqrt(variance[[-2, -1, 1]])])
     values, stated = np.array(rows).swapaxes(0, 1)
-    low, high = np.sqrt(chi2.isf([1 - 1e-5, 1e-5], SEEDS) / SEEDS)
-    scatter = np.sqrt(np.mean(((values - [*truth, SIGMA]) / stated) ** 2, axis=0))
+    low, high = root_mean_square_range(SEEDS, 1e-5)
+    scatter = root_mean_square((values - [*truth, SIGMA]) / stated)
     # The calibration states the same of each scan, to a hundredth.
     assert np.all(scatter < 1.09 * high)
     assert np.all(scatter[:2] > low / 1.18)

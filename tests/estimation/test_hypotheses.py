@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from helpers import outside
-from helpers.bounds import FULL
+from helpers.bounds import FULL, root_mean_square, root_mean_square_range
 from helpers.outside import ROUND, line
 from helpers.scans import CENTRE, CONVERSION, as_points, estimated, simulated
 from scipy.stats import binom, chi2
@@ -81,8 +81,9 @@ def test_a_hysteresis_is_found_and_measured_within_its_uncertainty(differences):
     assert all(columns.outcome.value > columns.outcome.limit for columns in extra)
     truth = np.insert(differences, 1, 0.0)  # of the width
     z = np.array([(columns.values - truth) / columns.errors for columns in extra])
-    low, high = chi2.ppf([1e-6, 1 - 1e-6], scans)
-    assert np.all((low < np.sum(z**2, axis=0)) & (np.sum(z**2, axis=0) < high))
+    low, high = root_mean_square_range(scans, 1e-6)
+    scatter = root_mean_square(z)
+    assert np.all((low < scatter) & (scatter < high))
     found = hysteresis_test(estimated(as_points(hysteretic(0, *differences))))
     np.testing.assert_allclose(found.values, extra[0].values, rtol=1e-6, atol=1e-9)
 

@@ -4,9 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from helpers.bounds import FULL
+from helpers.bounds import FULL, root_mean_square_range
 from helpers.scans import CONVERSION, RING, TAILS, estimated, simulated
-from scipy.stats import chi2
 
 import memscal
 from memscal.errors import FitError
@@ -16,14 +15,13 @@ from memscal.estimation.departures import ReducedScan
 
 def test_the_noise_is_found_from_the_scatter_alone():
     # Scans of about 60 degrees of freedom each: the pooled variance follows chi-square.
-    degrees = 60
     seeds = range(40 if FULL else 20)
     ratios = []
     for seed in seeds:
         scan = simulated(noise=0.01, state_noise=False, seed=seed)
         ratios.append(estimated(scan).noise_scale / scan.synthetic["noise"])
     pooled = np.mean(np.square(ratios))
-    low, high = chi2.ppf([1e-6, 1 - 1e-6], degrees * len(seeds)) / (degrees * len(seeds))
+    low, high = root_mean_square_range(60 * len(seeds), 1e-6) ** 2
     # Down-weighted chance outliers and spent departures take up to three percent.
     assert low - 0.06 < pooled < high
 

@@ -5,9 +5,8 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
-from helpers.bounds import FULL
+from helpers.bounds import FULL, root_mean_square_range
 from helpers.scans import simulate, simulate_contacts, simulate_experiment
-from scipy.stats import chi2
 
 import memscal
 from memscal import LoadCell
@@ -130,7 +129,7 @@ def test_the_force_over_load_has_the_error_that_it_states():
     for seed in SEEDS:
         ratio, spread = pooled_force(measured(seed)[0].profiles)
         z.append((ratio - 1) / np.hypot(spread, 0.005))
-    low, high = chi2.ppf([CHANCE, 1 - CHANCE], len(z)) / len(z)
+    low, high = root_mean_square_range(len(z), CHANCE) ** 2
     assert 0.3 * low < np.mean(np.square(z)) < high
     apart = [pooled_force(measured(seed, OTHER)[0].profiles)[1] for seed in SEEDS[:2]]
     assert min(apart) > 3 * pooled_force(measured(0)[0].profiles)[1]

@@ -10,6 +10,7 @@ from scipy.stats import chi2
 
 import memscal
 from memscal.model.apparatus import ParameterSet
+from memscal.model.arrays import FloatArray
 
 FULL = bool(os.environ.get("MEMSCAL_FULL_STUDY"))
 """Whether studies run over all their seeds and on their finest meshes."""
@@ -22,6 +23,23 @@ RARE = 1e-9
 def root_mean_square_limit(ratio: float, count: int, chance: float) -> float:
     """Largest RMS of ``count`` normal deviates of RMS ``ratio``, but for this chance."""
     return ratio * float(np.sqrt(chi2.isf(chance, count) / count))
+
+
+def root_mean_square_range(count: int, chance: float) -> FloatArray:
+    """Smallest and largest RMS of ``count`` normal deviates, but for this chance each."""
+    return np.sqrt(chi2.isf([1 - chance, chance], count) / count)
+
+
+def root_mean_square(values) -> FloatArray:
+    """RMS along the first axis."""
+    return np.sqrt(np.mean(np.square(values), axis=0))
+
+
+def deviates(parameters: ParameterSet, truths: dict[str, float]) -> list[float]:
+    """Return errors of parameters over their standard uncertainties."""
+    return [
+        (parameters[name] - true) / parameters.uncertainty(name) for name, true in truths.items()
+    ]
 
 
 @lru_cache

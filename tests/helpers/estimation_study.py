@@ -12,7 +12,13 @@ from typing import Any
 from zlib import crc32
 
 import numpy as np
-from helpers.bounds import FULL, cramer_rao, root_mean_square_limit
+from helpers.bounds import (
+    FULL,
+    cramer_rao,
+    deviates,
+    root_mean_square,
+    root_mean_square_range,
+)
 from helpers.direct import Kernel, Tapered, direct_scan
 from helpers.scans import CONVERSION, calibrated
 from scipy.stats import binom, t
@@ -334,11 +340,6 @@ def half_width(kernel: Kernel) -> float:
     return 2 * float(np.interp(-g.max() / 2, -g[between], r[between]))
 
 
-def root_mean_square(values: FloatArray) -> FloatArray:
-    """RMS over the seeds, which are the first axis."""
-    return np.sqrt(np.mean(values**2, axis=0))
-
-
 def plane_norm(error: FloatArray) -> FloatArray:
     """L2 norm over the plane of functions at :data:`R`, along the last axis."""
     return np.sqrt(np.sum(R * error**2, axis=-1))
@@ -399,7 +400,7 @@ class Outcome:
         luck = chance(self.g.size)
         # One of many radii may exceed a limit by chance.
         rare = luck / RADII.size
-        least, most = (root_mean_square_limit(1.0, seeds, p) for p in (1 - rare, rare))
+        least, most = root_mean_square_range(seeds, rare)
         yield "error of G", least_median(self.g) <= self.case.largest_error(limits)
         yield "worst", binom.sf(self.beyond(limits) - 1, seeds, limits.beyond) >= luck
         mean, error = self.bias_g
@@ -411,7 +412,7 @@ class Outcome:
         yield "band of G", share + t.isf(luck, seeds - 1) * error >= limits.mean_coverage
         yield "u of G small", self.ratio.max() <= limits.ratio[1] * most
         yield "u of G large", self.ratio.min() >= limits.ratio[0] * least
-        least, most = (root_mean_square_limit(1.0, seeds, p) for p in (1 - luck, luck))
+        least, most = root_mean_square_range(seeds, luck)
         if (bound := self.case.bound) is not None:
             yield "RMS of A", root_mean_square(self.a) <= limits.efficiency * most * bound
         z = self.z["A"]
@@ -451,8 +452,8 @@ def study(name: str, seeds: int = SEEDS) -> Outcome:
         rows.append(errors_of(case, seed, apparatus))
         p = apparatus.parameters
         width = half_width(case.drawn(seed)[0])
-        truths = {"conversion_constant": CONVERSION, "fwhm": width, "gaussian_sigma": case.sigma}
-        z.append([(p[n] - t) / p.uncertainty(n) for n, t in truths.items() if t is not None])
+        truths = {"conversion_constant": CONVERSION, "fwhm": width}
+        z.append(deviates(p, truths | ({"gaussian_sigma": case.sigma} if case.sigma else {})))
     columns = {name: np.array([row[name] for row in rows]) for name in rows[0]}
     return Outcome(case, **columns, z=dict(zip(("A", "FWHM", "σ"), np.array(z).T, strict=False)))
 

@@ -14,7 +14,7 @@ from functools import lru_cache
 
 import numpy as np
 from helpers import two_states
-from helpers.bounds import FULL
+from helpers.bounds import FULL, deviates, root_mean_square
 from helpers.direct import LOADS, TABLE, base_stresses
 from helpers.outside import ROUND, SIGMA, A, Noise, World, correlated, elliptic, lobe, tail
 from helpers.outside import scan as perturbed_scan
@@ -23,7 +23,6 @@ from scipy.interpolate import make_interp_spline
 from scipy.special import j0
 
 from memscal import ApparatusFunction, Scan
-from memscal.model.apparatus import ParameterSet
 from memscal.model.arrays import FloatArray
 
 RUNS = 30 if FULL else 6
@@ -37,13 +36,6 @@ _RATIO = 1.25
 COUNTED = 1.4
 ALARMED = 0.9
 NAMED = 1.5
-
-
-def deviates(parameters: ParameterSet, truths: dict[str, float] = TRUTHS) -> list[float]:
-    """Return errors of parameters over their standard uncertainties."""
-    return [
-        (parameters[name] - true) / parameters.uncertainty(name) for name, true in truths.items()
-    ]
 
 
 Stated = Callable[[Scan, float], Scan]
@@ -242,7 +234,7 @@ def outcome(row: Row, runs: int = RUNS, draws: int = DRAWS) -> Outcome:
             failed.update(names)
     stated = sizes or [row.first]
     by_size = [row.stated_deviations(size, draws) for size in stated] if row.stated else []
-    counted = [float(np.sqrt(np.mean(np.square(z)))) for z in by_size]
+    counted = [float(root_mean_square(z)) for z in by_size]
     named = None
     if row.assumption and math.isfinite(two):
         assumptions = {each.name: each for each in row.exactly(0.0).assumptions}

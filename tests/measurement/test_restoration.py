@@ -6,7 +6,7 @@ from functools import lru_cache
 import numpy as np
 import pytest
 from helpers import scans as made
-from helpers.bounds import FULL, cramer_rao
+from helpers.bounds import FULL, cramer_rao, root_mean_square_range
 from helpers.scans import simulate
 from scipy.stats import chi2
 
@@ -144,7 +144,7 @@ def test_a_rod_s_stress_comes_back_from_several_loads_and_from_a_raster(setting)
     scans = [simulate(film=EXACT.film, seed=s, **setting) for s in range(FEW)]
     found = [memscal.restore(scan, EXACT) for scan in scans]
     z = [(f.force - f.scan.load) / f.force_uncertainty for f in found]
-    low, high = chi2.ppf([1e-4, 1 - 1e-4], len(z)) / len(z)
+    low, high = root_mean_square_range(len(z), 1e-4) ** 2
     # Half of a mean square of one: any shape may be.
     assert 0.4 * low < np.mean(np.square(z)) < high
     raster = "raster" in setting
