@@ -3,7 +3,6 @@
 Set MEMSCAL_FULL_STUDY for 20 seeds at 0.1 and 0.5 % of noise in place of one at 0.1 %.
 """
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import pytest
@@ -21,8 +20,6 @@ SEEDS = 20 if FULL else 1
 NOISES = (0.001, 0.005) if FULL else (0.001,)
 NAMED = 0.9
 """Share of the scans that fail whose cause is named."""
-
-Scans = Callable[..., memscal.Scan]
 
 
 def of(**other):

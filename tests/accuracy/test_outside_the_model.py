@@ -91,7 +91,6 @@ def test_sizes_for_one_uncertainty_are_those_of_perturbed_scans(method, noise):
 UNTOLD = ("tail of G of 3 mm", "lag along the line")
 CHANCE = 1e-4
 DOCS = Path(__file__).parents[2] / "docs"
-PAGE = (DOCS / "quality.md").read_text(encoding="utf-8")
 with (DOCS / "outside_study.csv").open(encoding="utf-8") as file:
     TABLE = {row["not as stated"]: row for row in csv.DictReader(file)}
 

@@ -29,6 +29,14 @@ def stated(**sizes):
     return replace(outside_scan(ROUND, 1), **uncertainties)
 
 
+def by_name(apparatus):
+    return {assumption.name: assumption for assumption in apparatus.assumptions}
+
+
+def states_of(apparatus):
+    return {name: assumption.state for name, assumption in by_name(apparatus).items()}
+
+
 def text_of(apparatus):
     return " ".join(message.text for message in apparatus.process.messages)
 
@@ -42,7 +50,7 @@ def test_what_is_stated_is_in_the_budget_by_its_size_for_one_uncertainty(name):
     free = memscal.calibrate(stated()).apparatus
     counted = memscal.calibrate(stated(**{name: SIZES[name]})).apparatus
     line = counted.budget["conversion_constant"][name]
-    listed = {assumption.name: assumption for assumption in free.assumptions}
+    listed = by_name(free)
     u = free.parameters.uncertainty("conversion_constant")
     if name == "gain":
         assert line == pytest.approx(SIZES[name] * counted.conversion_constant, rel=1e-6)
@@ -52,7 +60,7 @@ def test_what_is_stated_is_in_the_budget_by_its_size_for_one_uncertainty(name):
     share = SIZES[name] / assumption.sizes["conversion_constant"]
     expected = 2**0.5 * share**2 if name == "line_offset" else share
     assert line == pytest.approx(expected * u, rel=0.05)
-    states = {assumption.name: assumption.state for assumption in counted.assumptions}
+    states = states_of(counted)
     assert states[assumption.name] == "stated"
 
 
@@ -62,7 +70,7 @@ def test_a_curved_baseline_is_fitted_with_a_prior_and_counts():
     uncertainties = []
     for size in (None, 0.002, 0.0):
         found = memscal.calibrate(stated(baseline_curvature=size)).apparatus
-        states = {assumption.name: assumption.state for assumption in found.assumptions}
+        states = states_of(found)
         assert states[name] == ("assumed" if size is None else "stated")
         # Held straight, there is nothing to fit.
         assert (name in found.parameters.names) == (size != 0)
@@ -111,9 +119,8 @@ def test_the_mean_of_an_offset_is_corrected():
 def test_a_raster_measures_what_a_line_assumes():
     line = memscal.calibrate(stated()).apparatus
     raster = memscal.calibrate(memscal.simulate(raster=True, points=17, seed=1)).apparatus
-    names = {assumption.name for assumption in line.assumptions}
-    assert {"roundness", "line_offset"} <= names
-    states = {assumption.name: assumption.state for assumption in raster.assumptions}
+    assert {"roundness", "line_offset"} <= set(by_name(line))
+    states = states_of(raster)
     assert states["roundness"] == states["line_offset"] == "measured"
 
 
@@ -124,7 +131,7 @@ def test_what_the_budget_counts_unasked_is_listed_with_its_size():
     apparatus = memscal.calibrate(
         replace(made, film=film, rod_friction=None), other=False
     ).apparatus
-    listed = {assumption.name: assumption for assumption in apparatus.assumptions}
+    listed = by_name(apparatus)
     # Half the difference of the ends, and the whole one, as rectangles.
     for name, line, ends in (("film_law", "model_form", 3), ("rod_friction", "rod_friction", 12)):
         for parameter in ("conversion_constant", "gaussian_sigma"):
@@ -138,8 +145,8 @@ def test_what_the_budget_counts_unasked_is_listed_with_its_size():
 def test_of_a_relative_constant_no_load_is_taken_for_granted():
     scan = replace(stated(), load_uncertainty=None)
     for relative in (False, True):
-        found = memscal.calibrate(scan, relative=relative).assumptions
-        assert ("load_scale" in {assumption.name for assumption in found}) is not relative
+        found = memscal.calibrate(scan, relative=relative)
+        assert ("load_scale" in by_name(found)) is not relative
 
 
 def test_an_offset_as_in_another_unit_is_refused():
@@ -213,7 +220,7 @@ def test_crossed_lines_measure_axis_ratio_and_each_other_s_offset(world):
     assert abs(error) < 1.5 * apparatus.parameters.uncertainty("conversion_constant") / A
     ratio = (1 + apparatus.parameters["ellipticity"]) / (1 - apparatus.parameters["ellipticity"])
     assert ratio**0.5 == pytest.approx(1.4 if world != ROUND else 1.0, abs=0.03)
-    states = {assumption.name: assumption.state for assumption in apparatus.assumptions}
+    states = states_of(apparatus)
     assert states["roundness"] == states["line_offset"] == "measured"
     texts = [m.text for m in apparatus.process.messages if m.kind == "line_offset"]
     assert "at 0.30" in texts[0]
@@ -222,7 +229,7 @@ def test_crossed_lines_measure_axis_ratio_and_each_other_s_offset(world):
 def test_lines_of_unlike_zeros_measure_no_offset():
     along, across = crossed(ROUND)
     apparatus = memscal.calibrate([along, replace(across, x=across.x + 5e-3)]).apparatus
-    states = {assumption.name: assumption.state for assumption in apparatus.assumptions}
+    states = states_of(apparatus)
     assert (states["roundness"], states["line_offset"]) == ("measured", "assumed")
 
 

@@ -14,8 +14,6 @@ from memscal.errors import OutputError
 from memscal.formats import files
 from memscal.formats.files import atomic_write_bytes, ensure_writable, together
 
-pytestmark = pytest.mark.usefixtures("folder")
-
 OLD = b"the old output"
 
 

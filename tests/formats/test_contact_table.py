@@ -16,8 +16,6 @@ from memscal.formats.cache import (
 )
 from memscal.formats.hdf5.writer import Group, file_tree, write_tree
 
-pytestmark = pytest.mark.usefixtures("folder")
-
 KEY = table_key({"load": 0.34})
 
 

@@ -1,7 +1,6 @@
 """An altered artifact is refused; a newer major version is refused; a newer minor one is not."""
 
 from pathlib import Path
-from typing import Any
 
 import h5py
 import numpy as np
@@ -16,8 +15,6 @@ from memscal.formats.hdf5.writer import SCHEMA_VERSION
 from memscal.formats.inspection import check
 from memscal.formats.reference import read_reference, write_reference
 from memscal.formats.scan import read_scan, write_scan
-
-pytestmark = pytest.mark.usefixtures("folder")
 
 
 @pytest.fixture
@@ -126,8 +123,6 @@ def test_no_reader_uses_what_was_added_or_changed_unless_that_is_accepted(kind, 
 @pytest.fixture(params=["scan", "reference", "artifact"])
 def versioned(request, folder):
     path = folder / f"{request.param}.h5"
-    write: Any
-    read: Any
     write, read, thing = {
         "scan": (write_scan, read_scan, make_scan()),
         "reference": (write_reference, read_reference, make_profile()),

@@ -9,8 +9,6 @@ from helpers.tables import imported
 
 from memscal.errors import InputError, UnitWarning
 
-pytestmark = pytest.mark.usefixtures("folder")
-
 TABLE = Path("t.csv")
 N = 15
 X = np.arange(N) - 7.0

@@ -19,8 +19,6 @@ from memscal.formats.hdf5 import limits
 from memscal.formats.hdf5.writer import DIGEST_ATTRIBUTE
 from memscal.formats.scan import read_scan, write_scan
 
-pytestmark = pytest.mark.usefixtures("folder")
-
 SIGNAL = "/entry/data/u_zz"
 SWEEP = """
 import pathlib, sys

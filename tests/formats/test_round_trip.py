@@ -25,8 +25,6 @@ from memscal.model.field_mesh import FieldMesh
 from memscal.model.indenter import Sphere
 from memscal.model.provenance import SourceFile
 
-pytestmark = pytest.mark.usefixtures("folder")
-
 
 def kept(**fields):
     """Write an artifact and read it."""

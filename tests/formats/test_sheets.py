@@ -19,8 +19,6 @@ import memscal
 from memscal.errors import FormatError, InputError
 from memscal.formats.tables import sheets
 
-pytestmark = pytest.mark.usefixtures("folder")
-
 X = [-8.0, 0.0, 8.0]
 U = [0.1, 2.0, 0.2]
 

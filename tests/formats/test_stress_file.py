@@ -22,8 +22,6 @@ from memscal.model.instrument import Equipment
 from memscal.model.provenance import Process, SourceFile
 from memscal.model.scan import LoadCell, StressSensor
 
-pytestmark = pytest.mark.usefixtures("folder")
-
 DATA = Path(__file__).parents[1] / "data"
 
 SCANS = tuple(

@@ -19,8 +19,6 @@ from memscal.model.checks import marked_texts
 from memscal.model.indenter import Rod, Sphere
 from memscal.model.scan import Scan
 
-pytestmark = pytest.mark.usefixtures("folder")
-
 
 def scan_table(text, **options):
     """Import a table with the usual options."""

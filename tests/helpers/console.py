@@ -6,7 +6,6 @@ import re
 import resource
 import subprocess
 import sys
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
@@ -37,10 +36,6 @@ class Outcome:
         for word in words:
             assert word in self.err, self.err
         return self
-
-
-Run = Callable[..., Outcome]
-"""Run ``memscal`` with arguments."""
 
 
 NUMBER = re.compile(r"-?\d+(?:\.\d+)?")

@@ -2,7 +2,6 @@
 
 import contextlib
 import json
-from collections.abc import Callable
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import NamedTuple
@@ -285,6 +284,3 @@ def change_table(data, changes):
         else:
             end = ("\r\n", "\r", "\n\n", "\x0b")[column % 4]
     return end.join(lines).encode(encoding, "replace")
-
-
-Damage = Callable[[bytes], bytes]
