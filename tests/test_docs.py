@@ -17,6 +17,7 @@ import pytest
 from helpers.bench import Bench
 from helpers.bounds import FULL
 from helpers.console import numbers, words
+from helpers.folders import SHIPPED
 from helpers.scans import simulate
 
 import memscal
@@ -165,13 +166,13 @@ def follow(page, run):
 
 
 def test_the_page_on_tables_imports_the_shipped_ones(folder, run):
-    for table in DOCS.with_name("calibration_data").glob("tables/*.csv"):
+    for table in SHIPPED.glob("tables/*.csv"):
         shutil.copy(table, folder)
     follow("import_tables.md", run)
 
 
 def test_the_page_on_incomplete_scans_calibrates_them(folder, run, capsys):
-    shutil.copy(DOCS.with_name("calibration_data") / "tables" / "rod.csv", folder)
+    shutil.copy(SHIPPED / "tables" / "rod.csv", folder)
     assert (
         "mV (relative: the load is not known)" in follow("incomplete_scan.md", run)["calibrate"].out
     )
@@ -232,7 +233,7 @@ def test_the_page_on_plans_finds_the_repeats_that_it_names(folder, run):
 
 
 def test_the_examples_of_the_page_on_python_run(folder):
-    shutil.copytree(DOCS.with_name("calibration_data"), folder / "calibration_data")
+    shutil.copytree(SHIPPED, folder / "calibration_data")
     names = run_examples("api.md")
     assert names["apparatus"].gaussian_sigma == pytest.approx(561e-6, rel=0.05)
     assert names["sigma"] == pytest.approx(561e-6, rel=0.05)
@@ -278,7 +279,7 @@ def test_a_page_is_read_in_minutes():
 
 
 def test_the_methods_of_the_page_on_a_method_of_ones_own_calibrate(monkeypatch, capsys):
-    monkeypatch.chdir(DOCS.with_name("calibration_data"))
+    monkeypatch.chdir(SHIPPED)
     monkeypatch.setattr("memscal.calibration.drawn_scatter.draw_count", lambda _: 3)
     names = run_examples("own_method.md")
     assert "(method richardson-lucy)" in capsys.readouterr().out

@@ -4,14 +4,14 @@ import json
 import subprocess
 import sys
 from inspect import isfunction
-from pathlib import Path
 from typing import get_args, get_type_hints
 
 import pytest
+from helpers.folders import SHIPPED
 
 import memscal
 
-SCAN = str(Path(__file__).parents[1] / "calibration_data" / "rod_scan_65.h5")
+SCAN = str(SHIPPED / "rod_scan_65.h5")
 NOT_PUBLIC = {
     "BudgetComparison",
     "FilmField",

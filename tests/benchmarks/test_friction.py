@@ -3,10 +3,10 @@
 import math
 import sys
 from dataclasses import replace
-from pathlib import Path
 from statistics import median
 from time import process_time
 
+from helpers.folders import SHIPPED
 from helpers.machine import once, show
 from helpers.paper import FILM, SPHERE
 
@@ -32,13 +32,10 @@ def test_a_kept_family_is_read_ten_times_faster_than_it_is_calculated(tmp_path):
     show("kept family, over a calculated one", ratio, 1 / 10)
 
 
-DATA = Path(__file__).parents[2] / "calibration_data"
-
-
 def test_measured_stress_and_comparison_cost_so_many_calibrations(tmp_path):
     # Processor time over that of one calibration of 65 points, all in one process; docs/speed.md.
-    experiment = DATA / "sphere_experiment"
-    scan = memscal.read_scan(DATA / "rod_scan_65.h5")
+    experiment = SHIPPED / "sphere_experiment"
+    scan = memscal.read_scan(SHIPPED / "rod_scan_65.h5")
     contacts = [memscal.read_scan(experiment / f"sphere_{k}.h5") for k in ("dry", "lubricated")]
     apparatus = memscal.calibrate(experiment / "rod_scan.h5").apparatus
     friction = (0, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.6, math.inf)

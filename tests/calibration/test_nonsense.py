@@ -9,6 +9,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from helpers.folders import SHIPPED
 from helpers.scans import LINEAR_FILM, RING, TAILS, known_apparatus, simulated
 
 import memscal
@@ -22,7 +23,6 @@ from memscal.mechanics.press_rod import press_rod
 pytestmark = pytest.mark.filterwarnings("ignore::memscal.errors.UnitWarning")
 
 FULL = pytest.mark.full_study
-SHIPPED = Path(__file__).parents[2] / "calibration_data" / "rod_scan_65.h5"
 SCAN = memscal.simulate(film=LINEAR_FILM, seed=65)
 
 
@@ -85,7 +85,7 @@ def test_a_narrow_scan_is_refused_with_the_value_at_which_it_fits(
     ],
 )
 def test_no_method_writes_nonsense(method, tmp_path, capsys):
-    path = Path(shutil.copy(SHIPPED, tmp_path / "scan.h5"))
+    path = Path(shutil.copy(SHIPPED / "rod_scan_65.h5", tmp_path / "scan.h5"))
     with h5py.File(path, "r+") as file:
         file["entry/sample/film/thickness"][...] = 2.5
     given = ["calibrate", str(path), "--accept-altered", "--method", method]

@@ -7,11 +7,11 @@ import math
 import re
 import shlex
 from dataclasses import asdict, replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from helpers.bounds import assert_as_stated, cramer_rao
+from helpers.folders import SHIPPED
 from helpers.scans import EXACT_FILM
 from numpy.testing import assert_allclose
 
@@ -21,8 +21,7 @@ from memscal.formats.inspection import check
 from memscal.formats.tables.reference import read_reference_table
 from memscal.mechanics.press_rod import press_rod
 
-DATA = Path(__file__).parents[2] / "calibration_data"
-README = (DATA / "README.md").read_text(encoding="utf-8")
+README = (SHIPPED / "README.md").read_text(encoding="utf-8")
 SCANS = [f"rod_scan_{name}.h5" for name in ("33", "65", "three_loads", "raster", "light")]
 EXPERIMENT = [
     f"sphere_experiment/{name}.h5" for name in ("rod_scan", "sphere_dry", "sphere_lubricated")
@@ -63,7 +62,7 @@ def rebuilt(tmp_path_factory):
 def imported(tmp_path_factory):
     """A folder in which the README's examples with the tables were followed."""
     folder = tmp_path_factory.mktemp("imported")
-    (folder / "calibration_data").symlink_to(DATA)
+    (folder / "calibration_data").symlink_to(SHIPPED)
     run_all(commands("console"), folder)
     return folder
 
@@ -71,12 +70,12 @@ def imported(tmp_path_factory):
 @pytest.fixture(scope="module")
 def calibrations():
     rods = [*SCANS, EXPERIMENT[0]]
-    return {name: memscal.calibrate(memscal.read_scan(DATA / name)) for name in rods}
+    return {name: memscal.calibrate(memscal.read_scan(SHIPPED / name)) for name in rods}
 
 
 @pytest.fixture(scope="module")
 def generator():
-    spec = importlib.util.spec_from_file_location("make_tables", DATA / "make_tables.py")
+    spec = importlib.util.spec_from_file_location("make_tables", SHIPPED / "make_tables.py")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
@@ -94,25 +93,25 @@ def stated(item):
 
 def test_the_folder_holds_what_its_readme_lists_and_is_small():
     listed = set(re.findall(r"^\| `([^`]+)`", README, flags=re.MULTILINE))
-    paths = [path for path in DATA.rglob("*") if path.suffix in {".h5", ".csv", ".toml"}]
-    shipped = {path.relative_to(DATA).as_posix() for path in paths}
+    paths = [path for path in SHIPPED.rglob("*") if path.suffix in {".h5", ".csv", ".toml"}]
+    shipped = {path.relative_to(SHIPPED).as_posix() for path in paths}
     assert shipped == listed == {*SCANS, *EXPERIMENT, *TABLES, ARTIFACT, "lab.toml"}
-    assert sum(path.stat().st_size for path in DATA.rglob("*") if path.is_file()) < 1_180_000
+    assert sum(path.stat().st_size for path in SHIPPED.rglob("*") if path.is_file()) < 1_180_000
 
 
 @pytest.mark.parametrize("name", [*SCANS, *EXPERIMENT, ARTIFACT])
 def test_every_hdf5_file_is_in_order(name):
-    assert [finding for finding in check(DATA / name) if not finding.passed] == []
+    assert [finding for finding in check(SHIPPED / name) if not finding.passed] == []
 
 
 def test_every_file_says_that_it_is_synthetic():
     for name in (*SCANS, *EXPERIMENT):
-        scan = memscal.read_scan(DATA / name)
+        scan = memscal.read_scan(SHIPPED / name)
         assert scan.synthetic
         assert "synthetic" in scan.title.lower()
     for name in TABLES:
-        assert (DATA / name).read_text(encoding="utf-8").startswith("# SYNTHETIC")
-    messages = memscal.load_apparatus(DATA / ARTIFACT).process.messages
+        assert (SHIPPED / name).read_text(encoding="utf-8").startswith("# SYNTHETIC")
+    messages = memscal.load_apparatus(SHIPPED / ARTIFACT).process.messages
     assert any("synthetic" in message.text for message in messages)
 
 
@@ -120,7 +119,7 @@ def test_every_file_says_that_it_is_synthetic():
 def test_a_calibration_finds_the_stored_truth_within_its_uncertainty(name, calibrations):
     calibration = calibrations[name]
     assert calibration.passed
-    scan = memscal.read_scan(DATA / name)
+    scan = memscal.read_scan(SHIPPED / name)
     truth = scan.synthetic
     assert truth["gaussian_sigma"] == 561e-6
     found = calibration.apparatus.parameters
@@ -138,7 +137,7 @@ def test_a_calibration_finds_the_stored_truth_within_its_uncertainty(name, calib
 
 @pytest.mark.parametrize("name", [*SCANS, *EXPERIMENT])
 def test_the_readmes_commands_make_the_shipped_scans(name, rebuilt):
-    shipped = memscal.read_scan(DATA / name)
+    shipped = memscal.read_scan(SHIPPED / name)
     made = memscal.read_scan(rebuilt / name)
     for field in ("x", "y", "x_errors", "u_zz", "u_zz_errors", "normal_load", "normal_load_errors"):
         expected = getattr(shipped, field)
@@ -158,12 +157,12 @@ def test_the_readmes_commands_make_the_shipped_scans(name, rebuilt):
 
 
 def test_the_shipped_artifact_is_what_calibrate_makes_now(rebuilt):
-    shipped, made = (memscal.load_apparatus(folder / ARTIFACT) for folder in (DATA, rebuilt))
+    shipped, made = (memscal.load_apparatus(folder / ARTIFACT) for folder in (SHIPPED, rebuilt))
     assert made.conversion_constant == pytest.approx(shipped.conversion_constant, rel=1e-9)
     assert made.gaussian_sigma == pytest.approx(shipped.gaussian_sigma, rel=1e-9)
     assert made.parameters.names == shipped.parameters.names
     source = shipped.process.input_scan
-    assert source.sha256 == hashlib.sha256((DATA / source.file_name).read_bytes()).hexdigest()
+    assert source.sha256 == hashlib.sha256((SHIPPED / source.file_name).read_bytes()).hexdigest()
     assert [c.name for c in made.checks] == [c.name for c in shipped.checks]
     assert_allclose(made.radial_profile.g, shipped.radial_profile.g, atol=1e-6 * made.field.g.max())
     assert_allclose(
@@ -179,14 +178,14 @@ def test_the_tables_are_what_their_generator_makes(generator, tmp_path):
     generator.own_experiment(tmp_path / "tables")
     for name in ("rod_scan_messy.csv", *OWN):
         # A last digit may be rounded the other way by another version of a library.
-        assert_allclose(numbers(tmp_path / name), numbers(DATA / name), rtol=0, atol=1.1e-5)
+        assert_allclose(numbers(tmp_path / name), numbers(SHIPPED / name), rtol=0, atol=1.1e-5)
 
 
 @pytest.mark.accuracy
 def test_the_table_of_finite_elements_is_what_its_generator_makes(generator, tmp_path):
     made = tmp_path / "rod_reference_fem.csv"
     generator.finite_element_reference(made)
-    assert_allclose(numbers(made), numbers(DATA / made.name), rtol=0, atol=1e-7)
+    assert_allclose(numbers(made), numbers(SHIPPED / made.name), rtol=0, atol=1e-7)
 
 
 def test_the_table_of_dry_contacts_becomes_a_scan_with_a_line_for_each_load_and_pass(imported):
@@ -223,13 +222,13 @@ def test_the_finite_element_table_moves_the_result_by_less_than_its_error_allows
     theirs = memscal.load_apparatus(imported / "fem.apparatus.h5")
     table = memscal.read_reference(imported / "fem.h5")
     contact = press_rod(ours.film, ours.indenter, 1.0, math.inf)
-    scan = memscal.read_scan(DATA / "rod_scan_65.h5")
+    scan = memscal.read_scan(SHIPPED / "rod_scan_65.h5")
     largest = np.max(np.abs(table.sigma_zz - contact.base_stress(table.r)))
     assert largest < 2e-3 * contact.base_stress(0.0)
     shear = contact.base_shear(table.r)  # the table's S13 is for the third axis upward
     units = {"r": "r (mm)", "r_unit": "mm", "sigma": "S33 (MPa)", "sigma_unit": "MPa"}
     signs = {"shear": "S13 (MPa)", "sign": -1, "shear_sign": -1}
-    sheared = read_reference_table(DATA / TABLES[1], load=1.0, **units, **signs).profile
+    sheared = read_reference_table(SHIPPED / TABLES[1], load=1.0, **units, **signs).profile
     assert_allclose(sheared.sigma_rz, shear, atol=4e-3 * np.abs(shear).max())
     assert table.force == pytest.approx(1.0, abs=1e-4)
 

@@ -6,8 +6,9 @@ from pathlib import Path
 from string import Template
 
 import pytest
+from helpers.folders import DATA
 
-MESH = Path(__file__).parents[1] / "data" / "vtk_film.vtu"
+MESH = DATA / "vtk_film.vtu"
 TABLES = {
     "left.csv": "path,wafer_x,wafer_y\na.h5,left,0\n",
     "no_path.csv": "sensor,path\n7,\n",

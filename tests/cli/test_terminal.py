@@ -1,9 +1,10 @@
 """What only shipped data shows: a load of several, and the names of checks."""
 
 import shutil
-from pathlib import Path
 
-SPHERE = Path(__file__).parents[2] / "calibration_data" / "sphere_experiment"
+from helpers.folders import SHIPPED
+
+SPHERE = SHIPPED / "sphere_experiment"
 
 
 def test_a_load_of_several_is_restored_by_its_number(run, folder):

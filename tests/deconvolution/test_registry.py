@@ -1,17 +1,16 @@
 """Regularisers by name: ours, others', and the names that do not exist."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.folders import SHIPPED
 
 import memscal
 from memscal.cli import main
 from memscal.deconvolution.division import create_regulariser, regulariser_names
 from memscal.errors import InputError
 
-DATA = Path(__file__).parents[2] / "calibration_data"
 PLUG_IN = '''
 from dataclasses import dataclass
 from typing import ClassVar
@@ -78,13 +77,13 @@ def test_an_unknown_name_is_refused_with_the_names_there_are():
 def test_a_method_that_left_is_refused_with_the_page_that_has_it(name):
     with pytest.raises(InputError, match=f"no method named {name}") as caught:
         create_regulariser(name)
-    page = DATA.with_name("docs") / "own_method.md"
+    page = SHIPPED.with_name("docs") / "own_method.md"
     assert f"docs/{page.name}" in caught.value.cure
     assert f'= "{name}"' in page.read_text(encoding="utf-8")
 
 
 def test_an_artifact_of_a_method_that_left_is_read_and_inspected(tmp_path, monkeypatch, capsys):
-    apparatus = memscal.load_apparatus(DATA / "rod_scan_65.apparatus.h5")
+    apparatus = memscal.load_apparatus(SHIPPED / "rod_scan_65.apparatus.h5")
     configuration = {**apparatus.process.configuration, "method": "richardson-lucy"}
     configuration["options"] = {"iterations": 80}
     process = replace(apparatus.process, configuration=configuration)

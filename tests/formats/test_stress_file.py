@@ -8,6 +8,7 @@ import h5py
 import numpy as np
 import pytest
 from helpers.builders import make_film
+from helpers.folders import DATA
 from helpers.scans import known_apparatus
 
 import memscal
@@ -21,8 +22,6 @@ from memscal.model.indenter import Sphere
 from memscal.model.instrument import Equipment
 from memscal.model.provenance import Process, SourceFile
 from memscal.model.scan import LoadCell, StressSensor
-
-DATA = Path(__file__).parents[1] / "data"
 
 SCANS = tuple(
     MeasuredScan(

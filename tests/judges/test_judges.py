@@ -5,9 +5,9 @@ import subprocess
 import sys
 import warnings
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
+from helpers.folders import SHIPPED
 from helpers.nexus import definitions_folder, violations
 
 import memscal
@@ -32,11 +32,10 @@ def written(tmp_path_factory):
             "named",
         )
     }
-    data = Path(__file__).parents[2] / "calibration_data"
-    experiment = data / "sphere_experiment"
+    experiment = SHIPPED / "sphere_experiment"
     contacts = [memscal.read_scan(experiment / f"sphere_{k}.h5") for k in ("dry", "lubricated")]
     scan = memscal.read_scan(experiment / "rod_scan.h5")
-    raster = data / "rod_scan_raster.h5"
+    raster = SHIPPED / "rod_scan_raster.h5"
     apparatus = memscal.calibrate(scan).apparatus
     # NeXus has another meaning of names that end with "_offset".
     names = [name for name in STATED_ERRORS if name != "line_offset"]
@@ -50,7 +49,7 @@ def written(tmp_path_factory):
     memscal.calibrate(raster).apparatus.save(files["of_raster"])
     memscal.measure_stress(contacts, apparatus).save(files["stress"])
     unnamed = replace(scan, sensor=memscal.StressSensor(), load_cell=memscal.LoadCell())
-    additions = read_laboratory(data / "lab.toml").additions(unnamed)
+    additions = read_laboratory(SHIPPED / "lab.toml").additions(unnamed)
     memscal.calibrate(replace(unnamed, **additions)).apparatus.save(files["named"])
     return files
 

@@ -2,17 +2,16 @@
 
 import re
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.folders import SHIPPED
 from helpers.pages import PAPER, cut, violations
 from helpers.scans import known_apparatus, pressed, simulate, sphere_scan
 
 import memscal
 from memscal.cli import main
 
-DATA = Path(__file__).parents[2] / "calibration_data"
 KINDS = ("calibrate", "apply", "compare", "restore", "batch")
 #: A name that has no place to break, and text that a page must not take for its own.
 LONG = "a_name_without_a_place_to_break_it_" * 4 + "<b>&amp;"
@@ -24,7 +23,7 @@ def reports(tmp_path_factory):
     folder = tmp_path_factory.mktemp("reports")
     pages = {kind: folder / f"{kind}.html" for kind in (*KINDS, "certificate")}
     files = {name: str(folder / f"{name}.h5") for name in ("artifact", "stress", "known", "one")}
-    scans = [str(DATA / "sphere_experiment" / f"sphere_{k}.h5") for k in ("dry", "lubricated")]
+    scans = [str(SHIPPED / "sphere_experiment" / f"sphere_{k}.h5") for k in ("dry", "lubricated")]
     memscal.write_scan(sphere_scan(pressed(), seed=5), files["one"])
     known_apparatus(conversion_uncertainty=0.005, width_uncertainty=0.01).save(files["known"])
     sensor = memscal.StressSensor(name=LONG, model="W7", serial_number="7")
@@ -43,12 +42,12 @@ def reports(tmp_path_factory):
         "batch": ["batch", str(folder / "scans"), "-o", str(folder / "results")],
         "calibrate": ["calibrate", drifting, "-o", str(folder / "d.h5")],
     }
-    rod = str(DATA / "sphere_experiment" / "rod_scan.h5")
+    rod = str(SHIPPED / "sphere_experiment" / "rod_scan.h5")
     assert main(["calibrate", rod, "-o", files["artifact"]]) == 0
     codes = {kind: main([*run, "--report", str(pages[kind])]) for kind, run in runs.items()}
     failing = ("batch", "calibrate")
     assert codes == {kind: int(kind in failing) for kind in runs}
-    certify = ["certificate", files["artifact"], "--lab", str(DATA / "lab.toml")]
+    certify = ["certificate", files["artifact"], "--lab", str(SHIPPED / "lab.toml")]
     assert main([*certify, "-o", str(pages["certificate"])]) == 0
     return pages
 

@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 from helpers.builders import make_artifact, make_profile, make_scan
 from helpers.console import names
+from helpers.folders import DATA, SHIPPED
 from helpers.scans import simulate
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
@@ -75,7 +76,7 @@ class Good(dict[str, bytes]):
 def good(tmp_path_factory):
     """The bytes of a good file of each kind."""
     folder = tmp_path_factory.mktemp("good")
-    experiment = Path(__file__).parents[2] / "calibration_data" / "sphere_experiment"
+    experiment = SHIPPED / "sphere_experiment"
     # Of a linear film a rod that is not in the table is solved in milliseconds.
     film = memscal.ElasticFilm(
         young_modulus=2.2e6, poisson_ratio=0.48, thickness=2e-3, law="linear"
@@ -93,8 +94,7 @@ def good(tmp_path_factory):
     rows = zip(scan.x * 1e3, scan.u_zz * 1e3, strict=True)
     lines = ["x (mm),u_zz (mV)", *(f"{x:.4f},{u:.6f}" for x, u in rows)]
     (folder / "table").write_text("\n".join(lines))
-    meshes = Path(__file__).parents[1] / "data"
-    (folder / "mesh").write_bytes((meshes / "getfem_film.vtu").read_bytes())
+    (folder / "mesh").write_bytes((DATA / "getfem_film.vtu").read_bytes())
     return Good({path.name: path.read_bytes() for path in folder.iterdir()})
 
 

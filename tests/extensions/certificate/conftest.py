@@ -1,26 +1,24 @@
 """An artifact, the shipped laboratory's file, and a certificate made of both."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
+from helpers.folders import SHIPPED
 
 import memscal
 from memscal.extensions.certificate.certificate import certify
 from memscal.extensions.certificate.laboratory import read_laboratory
 
-DATA = Path(__file__).parents[3] / "calibration_data"
-
 
 @pytest.fixture(scope="session")
 def laboratory():
-    return read_laboratory(DATA / "lab.toml")
+    return read_laboratory(SHIPPED / "lab.toml")
 
 
 @pytest.fixture(scope="session")
 def apparatus():
     """The shipped artifact of a sensor without a name, so that the file names it."""
-    shipped = memscal.load_apparatus(DATA / "rod_scan_65.apparatus.h5")
+    shipped = memscal.load_apparatus(SHIPPED / "rod_scan_65.apparatus.h5")
     return replace(shipped, sensor=memscal.StressSensor())
 
 

@@ -5,16 +5,15 @@ import sys
 from pathlib import Path
 
 import pytest
-
-DATA = Path(__file__).parents[3] / "calibration_data"
+from helpers.folders import SHIPPED
 
 
 @pytest.fixture
 def inputs(tmp_path, monkeypatch):
     """The shipped artifact, and the shipped file of a laboratory for its sensor."""
     monkeypatch.chdir(tmp_path)
-    shutil.copy(DATA / "rod_scan_65.apparatus.h5", "scan.apparatus.h5")
-    shutil.copy(DATA / "lab.toml", "lab.toml")
+    shutil.copy(SHIPPED / "rod_scan_65.apparatus.h5", "scan.apparatus.h5")
+    shutil.copy(SHIPPED / "lab.toml", "lab.toml")
     return ("scan.apparatus.h5", "--lab", "lab.toml")
 
 

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+from helpers.folders import SHIPPED
 
 import memscal
 from memscal.cli import main
@@ -10,8 +11,6 @@ from memscal.errors import MemscalError
 from memscal.extensions.certificate.laboratory import Measured, read_laboratory
 
 pytestmark = pytest.mark.usefixtures("folder")
-
-SHIPPED = Path(__file__).parents[3] / "calibration_data" / "lab.toml"
 
 
 def read(text):
@@ -72,7 +71,7 @@ def imported(*options):
     scan = memscal.simulate(seed=1)
     lines = [f"{x * 1e3},{u * 1e3}" for x, u in zip(scan.x, scan.u_zz, strict=True)]
     Path("scan.csv").write_text("\n".join(["x,U", *lines]), encoding="utf-8")
-    given = [*IMPORT.split(), "-o", "scan.h5", "--lab", str(SHIPPED), *options]
+    given = [*IMPORT.split(), "-o", "scan.h5", "--lab", str(SHIPPED / "lab.toml"), *options]
     return main(["import", "scan.csv", *given])
 
 

@@ -3,9 +3,9 @@
 import io
 import re
 import socket
-from pathlib import Path
 
 import pytest
+from helpers.folders import SHIPPED
 
 from memscal.cli import main
 from memscal.extensions.certificate.certificate import certify
@@ -17,8 +17,6 @@ pytestmark = [
     pytest.mark.pages,
     pytest.mark.filterwarnings("default::DeprecationWarning:weasyprint"),
 ]
-
-DATA = Path(__file__).parents[3] / "calibration_data"
 
 
 @pytest.fixture(scope="module")
@@ -85,7 +83,7 @@ def test_nothing_is_fetched_for_the_pdf(certificate, monkeypatch):
 
 
 def test_the_command_writes_the_pdf(tmp_path):
-    artifact = str(DATA / "rod_scan_65.apparatus.h5")
+    files = [str(SHIPPED / name) for name in ("rod_scan_65.apparatus.h5", "lab.toml")]
     output = tmp_path / "c.pdf"
-    assert main(["certificate", artifact, "--lab", str(DATA / "lab.toml"), "-o", str(output)]) == 0
+    assert main(["certificate", files[0], "--lab", files[1], "-o", str(output)]) == 0
     assert output.read_bytes().startswith(b"%PDF-1.7")

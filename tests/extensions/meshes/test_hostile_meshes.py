@@ -15,6 +15,7 @@ import h5py
 import meshio
 import numpy as np
 import pytest
+from helpers.folders import DATA
 from helpers.meshes import section, write
 
 from memscal.errors import FormatError, InputError, UnsafeFileError
@@ -442,7 +443,7 @@ def test_an_endless_reader_ends(hostile, monkeypatch):
 def test_damage_is_refused_or_harmless_wherever_it_is(name):
     path = Path(name)
     if name == "vtk_film.vtu":
-        path.write_bytes((Path(__file__).parents[2] / "data" / name).read_bytes())
+        path.write_bytes((DATA / name).read_bytes())
     else:
         small(name)
     good = path.read_bytes()

@@ -8,11 +8,11 @@ import meshio
 import numpy as np
 import pytest
 from helpers.console import names
+from helpers.folders import DATA
 from helpers.meshes import RADII, block, pressure, section
 
 import memscal
 
-DATA = Path(__file__).parents[2] / "data"
 MESH = ["--format", "reference", "--r-unit", "mm", "--sigma-unit", "MPa", "--load", 1]
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import meshio
 import numpy as np
 import pytest
+from helpers.folders import DATA
 from helpers.meshes import HEIGHTS, RADII, block, pressure, section, tensor, write
 
 from memscal.errors import FormatError, InputError, UnitError
@@ -16,8 +17,6 @@ from memscal.mechanics.film_response import base_stress
 from memscal.model.film import ElasticFilm
 
 pytestmark = pytest.mark.usefixtures("at_once", "folder")
-
-DATA = Path(__file__).parents[2] / "data"
 
 
 class GaussianPressure:
