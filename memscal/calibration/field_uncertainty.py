@@ -295,9 +295,8 @@ def _division_variances(
     columns = np.rint(x / dx).astype(np.intp) + shape[1] // 2
     variance = own[np.ix_(rows[stated[0]], columns[stated[1]])].ravel()
     for left, right in gain.parts:
-        by_points: Any = np.eye(share.size) if right is None else right
-        for some in slices(by_points.shape[1], _COLUMNS):
-            readings = division.divided(noise[:, None] * by_points[:, some])
+        for some in slices(right.shape[1], _COLUMNS):
+            readings = division.divided(noise[:, None] * np.asarray(right[:, some]))
             variance += 2 * np.sum((moved @ left[:, some]) * readings, axis=1)
     fitted = square_root(gain.covariance(np.sqrt(noise)))
     for some in slices(count, _COLUMNS):

@@ -17,7 +17,7 @@ from memscal.estimation.band import Band
 from memscal.estimation.forward import wave_table
 from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.smoothing import SmoothedProfile, rounded_reach
-from memscal.estimation.voltage_map import DENSE, VoltageMap
+from memscal.estimation.voltage_map import VoltageMap
 from memscal.model.arrays import ArrayFunction, FloatArray, IndexArray, array_record, value_record
 from memscal.model.places import EvenAxis
 from memscal.readings.find_places import even_lattice
@@ -238,8 +238,6 @@ class RasterFields:
         elsewhere = (table.spline.c.T @ both) * smoothed.spectrum.wavenumbers.weights
         own = table.interpolation(radius[self.index]).multiply(share[:, None]).tocsr()
         by_points = VoltageMap(((table.spline.c.T, own),))
-        if share.size <= DENSE:
-            by_points = VoltageMap(((by_points.dense(), None),))
         by_profile: VoltageMap = elsewhere @ smoothed.gain
         return (by_points + by_profile) * self.grid.cell_area
 

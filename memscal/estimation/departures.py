@@ -222,7 +222,8 @@ class ReducedScan:
         """Derivatives by the voltages (m, n) of numbers with these by the reduced data, (m, r)."""
         if self.right is not None:
             return VoltageMap(((gain, self.right),))
-        return VoltageMap(((self.model.points.unstandardise(gain.T.copy(), self.weights).T, None),))
+        right = self.model.points.unstandardise(gain.T.copy(), self.weights)
+        return VoltageMap(((np.eye(len(gain)), right),))
 
 
 #: At so many sets of wavenumbers or radii a basis keeps its columns.

@@ -31,7 +31,7 @@ from memscal.axisymmetry.hankel import ACROSS, RadialSpectrum, bessel, radial_sp
 from memscal.axisymmetry.kernels import gaussian_transfer
 from memscal.estimation.points import ScanPoints
 from memscal.estimation.voltage_map import BLOCK, DENSE
-from memscal.model.arrays import BoolArray, FloatArray, array_record
+from memscal.model.arrays import BoolArray, FloatArray, array_record, slices
 from memscal.model.sizes import too_large
 
 if TYPE_CHECKING:
@@ -244,7 +244,7 @@ class ForwardModel:
 
     def offset(self, centres: FloatArray) -> FloatArray:
         """Positions of the points from centres, shape (scans, 2), in m: (2, n)."""
-        return np.stack([self.points.x, self.points.y]) - np.atleast_2d(centres)[self.points.scan].T
+        return self.points.positions - np.atleast_2d(centres)[self.points.scan].T
 
     def geometry(self, centres: FloatArray) -> Geometry:
         """Return distances and Bessel functions for trial centres, shape (scans, 2), in m."""
@@ -293,8 +293,7 @@ class ForwardModel:
         for scans in alike.values():
             place = slice(start, start + size.size)
             own_factor = np.where(np.isin(self.points.scan, scans), factor, 0.0)
-            for row in range(0, factor.size, BLOCK):
-                block = slice(row, row + BLOCK)
+            for block in slices(factor.size, BLOCK):
                 waves = interpolation[block] @ splines
                 columns[block, place] = waves * own_factor[block, None]
             share = self._measures[scans[0]] / np.where(strongest > 0, strongest, 1.0)

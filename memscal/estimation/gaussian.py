@@ -17,7 +17,7 @@ from memscal.estimation.ellipse import elliptic_columns
 from memscal.estimation.forward import ForwardModel, Geometry
 from memscal.estimation.outliers import robust_scale
 from memscal.estimation.points import ScanPoints
-from memscal.estimation.voltage_map import DENSE, VoltageMap, evenly, triangular
+from memscal.estimation.voltage_map import VoltageMap, evenly, triangular
 from memscal.model.arrays import TINY, FloatArray, IndexArray, array_record
 
 _MOST_STEPS = 20
@@ -278,9 +278,7 @@ class GaussianFit:
         covariance = self.covariance(weights, 1.0)
         standardised = self.points.standardised(self.jacobian, weights)
         right = self.points.unstandardise(standardised, weights)
-        if len(right) > DENSE:
-            return VoltageMap(((covariance, right),))
-        return VoltageMap(((covariance @ right.T, None),))
+        return VoltageMap(((covariance, right),))
 
 
 def fit_gaussian_to_points(

@@ -17,7 +17,7 @@ from scipy.special import chdtrc, chdtri, fdtrc, fdtri, gammaincc, gammainccinv
 from memscal.estimation.points import grouped
 from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.voltage_map import DENSE, orthonormalised, triangular
-from memscal.model.arrays import TINY, FloatArray, IndexArray, array_record, value_record
+from memscal.model.arrays import TINY, FloatArray, IndexArray, array_record, slices, value_record
 from memscal.model.checks import FALSE_ALARM, OUTLIER_WEIGHT, chi_square_limit
 
 #: A departure of the expected size that moves no voltage by this share of its noise is left out.
@@ -290,8 +290,7 @@ def _traces(pairs: list[FloatArray], basis: FloatArray) -> tuple[float, float, f
             cubed += 6 * np.sum(first[: both.size] * second[i : i + both.size] * both)
     # Q'WQ, Q'W^2 Q and Q'W^3 Q, some columns at a time.
     products = np.zeros((3, basis.shape[1], basis.shape[1]))
-    for start in range(0, basis.shape[1], _COLUMNS):
-        some = slice(start, start + _COLUMNS)
+    for some in slices(basis.shape[1], _COLUMNS):
         moved = np.ascontiguousarray(basis[:, some].T)
         for product in products:
             moved = _weighted(pairs, moved)

@@ -165,25 +165,25 @@ class _RadialSpline:
     def fit(self, y: FloatArray, weight: FloatArray) -> tuple[VoltageMap, FloatArray]:
         """Smooth y (n,) by the restricted likelihood: coefficients by y, and what is predicted."""
         from scipy.linalg import solve_triangular
+        from scipy.sparse import eye_array
 
         root = np.sqrt(weight)
         weighted = self.points.multiply(root[:, None]).tocsr()
         # Between two knots few splines differ from zero: each interval has few rows in R.
-        few = root.size <= DENSE
-        cells, reduced = (
-            (None, weighted.toarray()) if few else _by_intervals(weighted, self.interval)
-        )
+        if root.size > DENSE:
+            cells, reduced = _by_intervals(weighted, self.interval)
+        else:
+            cells = eye_array(root.size, format="csr")
+            reduced = weighted.toarray()
         design = solve_triangular(self.root, (reduced @ self.free).T, trans="T").T
         left, values, right = np.linalg.svd(design, full_matrices=False)
         data = root * y
-        along = left.T @ (data if cells is None else cells.T @ data)
+        along = left.T @ (cells.T @ data)
         smoothing = _restricted_likelihood(values, along, float(data @ data), y.size)
         filters = values / (values**2 + smoothing)
         # The data, by the rows of the reduced design, to the coefficients.
         back = solve_triangular(self.root, (right.T * filters) @ left.T)
         predicted = self.points @ (self.free @ (back @ (left @ along)))
-        if cells is None:
-            return VoltageMap(((back * root, None),)), predicted
         return VoltageMap(((back, cells.multiply(root[:, None]).tocsr()),)), predicted
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from memscal.estimation.decorrelation import Decorrelation
-from memscal.model.arrays import FloatArray, IndexArray, array_record
+from memscal.model.arrays import FloatArray, IndexArray, array_record, slices
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
@@ -36,8 +36,7 @@ Tall: TypeAlias = "FloatArray | csr_array"
 class VoltageMap:
     """Derivatives (m, n) of m numbers by n voltages: a sum of products L R'."""
 
-    # (m, r) and (n, r) each; without a second factor the first is the matrix itself.
-    parts: tuple[tuple[FloatArray, Tall | None], ...]
+    parts: tuple[tuple[FloatArray, Tall], ...]  # (m, r) and (n, r) each
     #: So that numpy leaves ``array @ map`` to this class.
     __array_ufunc__ = None
 
@@ -68,10 +67,7 @@ class VoltageMap:
 
     def __matmul__(self, values: FloatArray) -> FloatArray:
         """Changes (m,) or (m, q) of the numbers for changes (n,) or (n, q) of the voltages."""
-        terms = []
-        for left, right in self.parts:
-            terms.append(left @ (values if right is None else _gram(right, values)))
-        return np.asarray(sum(terms))
+        return np.asarray(sum(left @ _gram(right, values) for left, right in self.parts))
 
     def __rmatmul__(self, rows: FloatArray) -> VoltageMap:
         """Linear combinations of the numbers, by rows (l, m)."""
@@ -95,28 +91,22 @@ class VoltageMap:
 
     def dense(self) -> FloatArray:
         """All derivatives, (m, n)."""
-        terms = [left if right is None else (right @ left.T).T for left, right in self.parts]
-        return np.asarray(sum(terms))
+        return np.asarray(sum((right @ left.T).T for left, right in self.parts))
 
     def over(self, factors: FloatArray, rows: IndexArray, count: int) -> VoltageMap:
         """Derivatives by ``count`` voltages, of which these, times factors (n,), are ``rows``."""
-        parts: list[tuple[FloatArray, Tall | None]] = []
-        for left, right in self.parts:
-            if right is None:
-                wide = np.zeros((len(left), count))
-                wide[:, rows] = left * factors
-                parts.append((wide, None))
-            else:
-                parts.append((left, _placed(right, factors, rows, count)))
-        return VoltageMap(tuple(parts))
+        from scipy.sparse import csr_array
+
+        placing: Any = csr_array((factors, (rows, np.arange(rows.size))), shape=(count, rows.size))
+        return VoltageMap(tuple((left, placing @ right) for left, right in self.parts))
 
     def covariance(self, noise: FloatArray, factor: Decorrelation | None = None) -> FloatArray:
         """Covariance (m, m) of the numbers, for voltages of a noise (n,) and its correlation."""
         parts = []
         for left, right in self.parts:
-            columns: Any = np.eye(left.shape[1]) if right is None else right
+            columns: Any = right
             if factor is not None:
-                dense = columns if isinstance(columns, np.ndarray) else columns.toarray()
+                dense = right if isinstance(right, np.ndarray) else right.toarray()
                 columns = factor.correlate_adjoint(noise[:, None] * dense)
             parts.append((left, columns))
         weight = noise**2 if factor is None else np.ones_like(noise)
@@ -129,27 +119,12 @@ class VoltageMap:
         return total
 
 
-def _placed(right: Tall, factors: FloatArray, rows: IndexArray, count: int) -> Tall:
-    if isinstance(right, np.ndarray):
-        wide = np.zeros((count, right.shape[1]))
-        wide[rows] = right * factors[:, None]
-        return wide
-    from scipy.sparse import coo_array
-
-    entries = right.tocoo()
-    row, column = entries.coords
-    data = entries.data * factors[row]
-    return coo_array((data, (rows[row], column)), shape=(count, right.shape[1])).tocsr()
-
-
 def _gram(first: Any, second: Any, weight: FloatArray | None = None) -> FloatArray:
     """Products of all columns, by blocks of rows."""
     total = np.zeros((first.shape[1], *second.shape[1:]))
-    for start in range(0, len(second) if weight is None else weight.size, BLOCK):
-        rows = slice(start, start + BLOCK)
+    for rows in slices(first.shape[0], BLOCK):
         weighted = second[rows] if weight is None else weight[rows, None] * second[rows]
-        product = first[rows].T @ weighted
-        total += product if isinstance(product, np.ndarray) else product.toarray()
+        total = total + first[rows].T @ weighted
     return total
 
 
@@ -161,9 +136,9 @@ def evenly(rows: NDArray[Any], most: int) -> NDArray[Any]:
 
 def triangular(columns: FloatArray) -> FloatArray:
     """Triangular factor R of the QR decomposition of tall columns (n, f), block by block."""
-    root = np.linalg.qr(columns[:BLOCK], mode="r")
-    for start in range(BLOCK, len(columns), BLOCK):
-        root = np.linalg.qr(np.vstack([root, columns[start : start + BLOCK]]), mode="r")
+    root: Any = columns[:0]
+    for rows in slices(len(columns), BLOCK):
+        root = np.linalg.qr(np.vstack([root, columns[rows]]), mode="r")
     return np.asarray(root)
 
 
@@ -181,8 +156,8 @@ def orthonormalised(
     right = right[singular > dependent * singular[0]]
     singular = singular[: len(right)]
     turn = (right / singular[:, None] / scale).T
-    for start in range(0, len(columns), BLOCK):
-        block = columns[start : start + BLOCK]
+    for rows in slices(len(columns), BLOCK):
+        block = columns[rows]
         block[:, : len(right)] = block @ turn
     return columns[:, : len(right)], singular[:, None] * right * scale
 

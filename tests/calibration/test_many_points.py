@@ -9,9 +9,9 @@ import pytest
 from helpers.scans import simulate
 
 import memscal
-from memscal.calibration import field_uncertainty, fields
+from memscal.calibration import field_uncertainty
 from memscal.errors import InputError
-from memscal.estimation import forward, gaussian, profile, residuals, smoothing, voltage_map
+from memscal.estimation import forward, profile, residuals, smoothing, voltage_map
 
 LINE = simulate(noise=0.005, seed=1)
 RASTER = simulate(noise=0.005, seed=1, raster=True, points=9)
@@ -99,7 +99,7 @@ def test_many_points_give_the_results_of_whole_matrices(name, method, monkeypatc
     scan, options = CASES[name]
     apparatus = []
     for dense, block in ((10**9, 10**9), (10, 67)):
-        for module in (forward, gaussian, profile, residuals, smoothing, fields):
+        for module in (forward, profile, residuals, smoothing):
             monkeypatch.setattr(module, "DENSE", dense)
         for module in (forward, voltage_map, field_uncertainty):
             monkeypatch.setattr(module, "BLOCK", block)
