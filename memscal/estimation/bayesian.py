@@ -102,14 +102,12 @@ class _Sensors:
         q, r = np.linalg.qr(values / scale)
         diagonal = np.abs(np.diagonal(r, axis1=1, axis2=2))
         log_determinant = np.log(diagonal * scale[:, 0]).sum(axis=1)
-        rest = data - _times(q, _times(q, data, transposed=True))
+        rest = data - _times(q, _times(q.mT, data))
         return cls(start, (choice / scale) @ np.linalg.inv(r), q, log_determinant, data, rest)
 
 
-def _times(matrices: FloatArray, vectors: FloatArray, *, transposed: bool = False) -> FloatArray:
-    """Product of each matrix, or of its transpose, with a vector of its own, (h, m)."""
-    if transposed:
-        matrices = matrices.swapaxes(1, 2)
+def _times(matrices: FloatArray, vectors: FloatArray) -> FloatArray:
+    """Product of each matrix with a vector of its own, (h, m)."""
     return (matrices @ vectors[:, :, None])[:, :, 0]
 
 
@@ -154,18 +152,18 @@ class _Conditionals:
     ) -> _Conditionals:
         """Decompose what each hypothesis chooses of the columns, (n, p)."""
         q = sensors.q[choice.family]
-        chosen = columns.T[choice.places].swapaxes(1, 2) * choice.factors[:, None, :]
-        explained = q.swapaxes(1, 2) @ chosen
+        chosen = columns.T[choice.places].mT * choice.factors[:, None, :]
+        explained = q.mT @ chosen
         by_amplitude = -(sensors.root[choice.family] @ explained)
         hypothesis = np.arange(len(choice.places))[:, None]
         amplitude = np.arange(choice.places.shape[1])
         by_amplitude[hypothesis, choice.places, amplitude] += choice.factors
         left, singular, right = np.linalg.svd(chosen - q @ explained, full_matrices=False)
-        data = _times(left, sensors.rest[choice.family], transposed=True)
+        data = _times(left.mT, sensors.rest[choice.family])
         power = data**2
         if noise.added:
             # Of a vector that meets the flat columns, only the rest of it carries noise.
-            power += noise.added * (1 - np.sum((q.swapaxes(1, 2) @ left) ** 2, axis=1))
+            power += noise.added * (1 - np.sum((q.mT @ left) ** 2, axis=1))
         prior = choice.strength**2
         signal = prior[:, None] * singular**2
         likelihoods = _likelihoods(sensors, choice.family, signal, power, noise)
@@ -176,7 +174,7 @@ class _Conditionals:
     @cached_property
     def by_component(self) -> FloatArray:
         """Changes of all parameters by amplitudes along the singular vectors, (h, p, s)."""
-        return self.by_amplitude @ self.right.swapaxes(1, 2)
+        return self.by_amplitude @ self.right.mT
 
     @property
     def slopes(self) -> FloatArray:
@@ -189,9 +187,9 @@ class _Conditionals:
     def means(self) -> FloatArray:
         """Posterior means of all parameters, (h, p)."""
         sensors = self.sensors
-        flat = _times(sensors.q, sensors.data, transposed=True)
+        flat = _times(sensors.q.mT, sensors.data)
         plain = (sensors.start + _times(sensors.root, flat))[self.family]
-        data = _times(self.left, sensors.data[self.family], transposed=True)
+        data = _times(self.left.mT, sensors.data[self.family])
         return plain + _times(self.by_component, self.filter * data)
 
     def gain(self, shares: FloatArray) -> FloatArray:

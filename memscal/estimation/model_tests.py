@@ -7,7 +7,7 @@ of freedom.  Others predict a group of points from the rest, or look for a ceili
 from dataclasses import replace
 
 import numpy as np
-from scipy.special import chdtrc, chdtri, fdtrc, fdtri, ndtri
+from scipy.special import chdtri, ndtri
 
 from memscal.axisymmetry.kernels import gaussian_transfer
 from memscal.errors import FitError
@@ -17,7 +17,7 @@ from memscal.estimation.departures import ReducedScan, departure_basis
 from memscal.estimation.gaussian import fit_gaussian_to_points
 from memscal.estimation.points import FEWEST_AT_CEILING, agreeing_tops
 from memscal.estimation.profile import NUMERICAL_FLOOR, ProfileEstimate
-from memscal.estimation.residuals import FEWEST_RESIDUALS, TestOutcome
+from memscal.estimation.residuals import FEWEST_RESIDUALS, TestOutcome, ratio_outcome
 from memscal.estimation.voltage_map import evenly, triangular
 from memscal.model.arrays import TINY, BoolArray, FloatArray, IndexArray, array_record, value_record
 from memscal.model.checks import FALSE_ALARM
@@ -61,46 +61,41 @@ def hold_out(estimate: ProfileEstimate, group: IndexArray) -> HeldOut | None:
     # The triangular factors of each fold's design and data stand for them.
     both = np.column_stack([model.design, model.data])
     roots = {int(i): triangular(both[fold == i]) for i in np.unique(fold)}
-    sizes = {i: int(np.sum(fold == i)) for i in roots}
-    outcomes = {}
+    sizes = np.bincount(fold)
+    ratios = {}
     for i in roots:
-        outcome = _predict(model.stated, roots, sizes, i, nuisances)
-        if outcome is not None:
-            outcomes[i] = outcome
-    folds = len(outcomes)
+        ratio = _predict(model.stated, roots, sizes, i, nuisances)
+        if ratio is not None:
+            ratios[i] = ratio
+    folds = len(ratios)
     if folds < 2:
         return None
-    worst = min(outcomes, key=lambda i: outcomes[i][0])
-    p_value, value, degrees, rest = outcomes[worst]
-    # The worst of several is worse than one: Bonferroni's correction, for any dependence.
-    p_value = min(folds * p_value, 1.0)
-    share = FALSE_ALARM / folds
-    limit = chdtri(degrees, share) / degrees if rest is None else fdtri(degrees, rest, 1 - share)
-    return HeldOut(value, float(limit), p_value, worst, folds, alone=count <= _MOST_FOLDS)
+    worst = min(ratios, key=lambda i: ratio_outcome(*ratios[i]).p_value)
+    outcome = ratio_outcome(*ratios[worst], of=folds)
+    return HeldOut(**vars(outcome), worst=worst, folds=folds, alone=count <= _MOST_FOLDS)
 
 
 def _predict(
-    stated: bool, roots: dict[int, FloatArray], sizes: dict[int, int], out: int, nuisances: slice
-) -> tuple[float, float, int, int | None] | None:
-    """P-value, chi-square per degree, its degrees, those of the others if no noise is stated."""
+    stated: bool, roots: dict[int, FloatArray], sizes: IndexArray, out: int, nuisances: slice
+) -> tuple[float, int, int | None] | None:
+    """Chi-square per degree, its degrees, and those of the others if no noise is stated."""
     own = roots[out]
     rest = np.vstack([root for i, root in roots.items() if i != out])
     both = np.vstack([rest, own])
     # What a fold alone determines is zero in the others but for rounding.
     size = np.linalg.norm(both[:, :-1], axis=0)
     others, rank = _left_over(rest, size)
-    others_degrees = sum(sizes.values()) - sizes[out] - rank
+    others_degrees = int(sizes.sum() - sizes[out]) - rank
     own_nuisances = both[:, nuisances].copy()
     own_nuisances[: len(rest)] = 0.0
     left, rank = _left_over(np.hstack([own_nuisances, both]), np.append(size[nuisances], size))
-    degrees = sum(sizes.values()) - rank - others_degrees
+    degrees = int(sizes.sum()) - rank - others_degrees
     if degrees < FEWEST_RESIDUALS or others_degrees < FEWEST_RESIDUALS:
         return None
     value = max(left - others, 0.0) / degrees
     if stated:
-        return float(chdtrc(degrees, degrees * value)), value, degrees, None
-    value /= max(others / others_degrees, TINY)
-    return float(fdtrc(degrees, others_degrees, value)), value, degrees, others_degrees
+        return value, degrees, None
+    return value / max(others / others_degrees, TINY), degrees, others_degrees
 
 
 def _left_over(root: FloatArray, size: FloatArray) -> tuple[float, int]:

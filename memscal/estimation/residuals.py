@@ -18,7 +18,7 @@ from memscal.estimation.points import grouped
 from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.voltage_map import DENSE, orthonormalised, triangular
 from memscal.model.arrays import TINY, FloatArray, IndexArray, array_record, slices, value_record
-from memscal.model.checks import FALSE_ALARM, OUTLIER_WEIGHT, chi_square_limit
+from memscal.model.checks import FALSE_ALARM, OUTLIER_WEIGHT
 
 #: A departure of the expected size that moves no voltage by this share of its noise is left out.
 _SHARE_OF_NOISE = 0.1
@@ -151,10 +151,8 @@ def residuals_of(estimate: ProfileEstimate, model: FreeModel | None = None) -> R
 
 def chi_square_test(residuals: Residuals) -> TestOutcome:
     """Test the residuals' size against the stated noise: chi-square per degree of freedom."""
-    degrees = residuals.degrees
     total = float(residuals.values @ residuals.values)
-    p_value = float(chdtrc(degrees, total))
-    return TestOutcome(total / degrees, chi_square_limit(degrees) / degrees, p_value)
+    return ratio_outcome(total / residuals.degrees, residuals.degrees, None)
 
 
 def pure_error_test(estimate: ProfileEstimate, model: FreeModel) -> TestOutcome | None:
@@ -209,10 +207,18 @@ def ring_test(
     return ratio_outcome(float(ratio[worst]), count[worst], rest, of=count.size)
 
 
-def ratio_outcome(value: float, above: float, below: float, of: int = 1) -> TestOutcome:
-    """Test an F ratio; the least p-value of so many is their number times as likely."""
-    limit = float(fdtri(above, below, 1 - FALSE_ALARM / of))
-    return TestOutcome(value, limit, min(of * float(fdtrc(above, below, value)), 1.0))
+def ratio_outcome(value: float, above: float, below: float | None, of: int = 1) -> TestOutcome:
+    """Test an F ratio, or chi-square per degree where nothing below is estimated (``None``)."""
+    # The least p-value of so many is their number times as likely (Bonferroni), whatever depends
+    # on what.
+    share = FALSE_ALARM / of
+    if below is None:
+        limit = chdtri(above, share) / above
+        p_value = chdtrc(above, above * value)
+    else:
+        limit = fdtri(above, below, 1 - share)
+        p_value = fdtrc(above, below, value)
+    return TestOutcome(value, float(limit), min(of * float(p_value), 1.0))
 
 
 def steps_test(residuals: Residuals) -> TestOutcome:
@@ -229,16 +235,12 @@ def steps_test(residuals: Residuals) -> TestOutcome:
     tested = square > _LEAST_STEP
     count = max(int(tested.sum()), 1)
     value = float(np.max(steps[tested, 0] ** 2 / square[tested], initial=0.0))
-    share = FALSE_ALARM / count
-    if residuals.stated:
-        p_value = float(chdtrc(1, value))
-        limit = float(chdtri(1, share))
-    else:
+    rest = None
+    if not residuals.stated:
         rest = residuals.degrees - 1
         value = rest * value / max(float(values @ values) - value, TINY)
-        p_value = float(fdtrc(1, rest, value))
-        limit = float(fdtri(1, rest, 1 - share))
-    return TestOutcome(math.sqrt(value), math.sqrt(limit), min(count * p_value, 1.0))
+    outcome = ratio_outcome(value, 1, rest, of=count)
+    return TestOutcome(math.sqrt(value), math.sqrt(outcome.limit), outcome.p_value)
 
 
 def neighbour_correlation_test(residuals: Residuals) -> TestOutcome:
