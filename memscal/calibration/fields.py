@@ -51,8 +51,7 @@ def choose_grid(estimate: ProfileEstimate, band: Band) -> GridChoice:
     beyond = np.arange(reference.size) > np.argmax(reference)
     closed = np.flatnonzero(beyond & (reference < 0.1 * NOISE_RATIO * band.weakest_reference))
     last = estimate.model.k[closed[0] if closed.size else -1]
-    width = max(estimate.gaussian.sigma, 0.5 * points.step)
-    spacing = min(width / _POINTS_PER_WIDTH, np.pi / (2 * last))
+    spacing = min(estimate.gaussian.width / _POINTS_PER_WIDTH, np.pi / (2 * last))
     spacing = float(support / (_COUNTED * np.ceil(support / spacing / _COUNTED)))
     span = max(float(np.ptp(offset)) for offset in estimate.offset)
     extent = max(span, 1.25 * support)

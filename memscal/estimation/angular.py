@@ -58,8 +58,8 @@ class AngularRings:
     @classmethod
     def about(cls, fit: GaussianFit) -> AngularRings:
         """Rings about a Gaussian fit."""
-        width = max(fit.sigma, 0.5 * fit.points.step)
-        return cls(width * np.arange(_SPACING / 2, _CUT * _EXTENT, _SPACING), _BLUR * width)
+        radius = fit.width * np.arange(_SPACING / 2, _CUT * _EXTENT, _SPACING)
+        return cls(radius, _BLUR * fit.width)
 
     def signal(self, model: ForwardModel, centres: FloatArray) -> FloatArray:
         """Voltages at the points, for centres (scans, 2) in m: (n, 8 q), in V."""
@@ -146,17 +146,13 @@ def angular_departures(
     # ``columns``, standardised: data (n,), of the fit's parameters, of all radial departures and
     # of the rings, (n, p).
     data, flat, radial, by_rings = (values / noise for values in columns)
-    width = rings.blur / _BLUR
-    size = fit.conversion_constant / (2 * np.sqrt(np.pi) * width)
-    units = _unit_amplitudes(rings.radius, width)
+    units = _unit_amplitudes(rings.radius, fit.width)
     # Shifts of all scans along x and y, then the ellipse along x and along the diagonals.
-    axis = np.nonzero(fit.points.free)[1]
-    shifts = flat[:, 2 : 2 + axis.size] @ np.eye(2)[axis]
-    parameters = [*shifts.T, *flat[:, -2:].T]
+    parameters = [*fit.shifts(flat).T, *flat[:, -2:].T]
     amplitudes = []
     voltages = []
     for i, block in enumerate(np.split(by_rings, 2 * len(ORDERS), axis=1)):
-        kernels = np.diag(size * units[i // 2])
+        kernels = np.diag(fit.size * units[i // 2])
         if i < len(parameters):
             # All combinations that the scan can tell from that parameter.
             alike = parameters[i] @ (block @ kernels)

@@ -34,8 +34,6 @@ from memscal.estimation.plane import PlaneDepartures, Spots
 from memscal.estimation.voltage_map import SINGLE, Tall, VoltageMap, orthonormalised
 from memscal.model.arrays import FloatArray, array_record, value_record
 
-#: Rings are never narrower than this many steps: a width below the sampling is not resolved.
-_SMALLEST_WIDTH_IN_STEPS = 0.5
 #: Neighbouring rings overlap: this share of their blur apart.
 _SPACING = 0.7
 _FEWEST_RINGS = 6
@@ -330,12 +328,11 @@ def departure_basis(
 ) -> DepartureBasis:
     """Return the kernels of the fit's own parameters and of every shape about it."""
     # With the scan as reduced about the fit, of the families' best fits, too.
-    width = max(fit.sigma, _SMALLEST_WIDTH_IN_STEPS * fit.points.step)
     rings: tuple[Rings, ...] = ()
     families: tuple[FamilyFit, ...] = ()
     if not isinstance(angular, PlaneDepartures):
-        rings = tuple(shape.rings(width, fit.conversion_constant) for shape in SHAPES)
-        families = () if reduced is None else tuple(_fitted_families(reduced, width))
+        rings = tuple(shape.rings(fit.width, fit.conversion_constant) for shape in SHAPES)
+        families = () if reduced is None else tuple(_fitted_families(reduced))
     flat = fit.jacobian.shape[1] + (angular.count if angular else 0)
     return DepartureBasis(fit.conversion_constant, fit.sigma, flat, rings, families, angular)
 
@@ -348,9 +345,10 @@ _LONGEST = 0.3
 _FARTHEST = 2.5
 
 
-def _fitted_families(reduced: ReducedScan, start: float) -> Iterator[FamilyFit]:
+def _fitted_families(reduced: ReducedScan) -> Iterator[FamilyFit]:
     """Fit A and width of every family, centre, baseline and drift by the way."""
     fit = reduced.fit
+    start = fit.width
     k = reduced.model.k
     step = _RELATIVE_STEP
     rows, left = fit.prior

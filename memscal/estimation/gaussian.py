@@ -247,6 +247,21 @@ class GaussianFit:
     predicted: FloatArray  # (n,): voltages of the fit, in V
 
     @property
+    def width(self) -> float:
+        """Its width in m, at least half a step: one below the sampling is not resolved."""
+        return max(self.sigma, 0.5 * self.points.step)
+
+    @property
+    def size(self) -> float:
+        """L2 norm of the round Gaussian of that width, in V/Pa/m."""
+        return float(self.conversion_constant / (2 * np.sqrt(np.pi) * self.width))
+
+    def shifts(self, columns: FloatArray) -> FloatArray:
+        """Of columns (n, p) by the parameters, shifts of all scans along x and along y, (n, 2)."""
+        axis = np.nonzero(self.points.free)[1]
+        return columns[:, self.points.centres] @ np.eye(2)[axis]
+
+    @property
     def prior(self) -> tuple[FloatArray, FloatArray]:
         """Further rows (c, p) of the jacobian by the curvatures' prior, and their residuals."""
         rows = self.points.prior_rows[:, : self.jacobian.shape[1]]
@@ -306,9 +321,8 @@ def _solve(
 ) -> GaussianFit:
     points = model.points
     # Typical size of each parameter, so that the solver sees numbers near one.
-    centres = int(points.free.sum())
     scale = np.full(start.size, np.ptp(points.u))
-    scale[: 2 + centres] = max(abs(start[1]), 0.05 * _smoothing_length(model))
+    scale[: points.centres.stop] = max(abs(start[1]), 0.05 * _smoothing_length(model))
     scale[0] = abs(start[0])
     scale[start.size - points.ellipse :] = _TYPICAL_ELLIPTICITY
     begin = start / scale
@@ -378,12 +392,12 @@ def linearise(model: ForwardModel, theta: FloatArray) -> GaussianFit:
     """Return the model and its derivatives at A, sigma, centres, drifts and ellipticity."""
     free = model.points.free
     ellipse = theta.size - model.points.ellipse
-    centres = 2 + int(free.sum())
+    centres = model.points.centres
     amplitude = float(theta[0])
     sigma = float(theta[1])
     centre = np.zeros(free.shape)
-    centre[free] = theta[2:centres]
-    drift = theta[centres:ellipse]
+    centre[free] = theta[centres]
+    drift = theta[centres.stop : ellipse]
     ellipticity = np.zeros(2)
     ellipticity[: theta.size - ellipse] = theta[ellipse:]
     geometry = model.geometry(centre)

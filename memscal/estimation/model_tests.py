@@ -54,7 +54,7 @@ def hold_out(estimate: ProfileEstimate, group: IndexArray) -> HeldOut | None:
     model = residuals.free_model(estimate, clip_outliers=True)
     # Centre, baseline and drift are fitted to a held-out group by itself.
     straight = estimate.model.straight_columns.shape[1]
-    nuisances = slice(2, 2 + int(estimate.points.free.sum()) + straight)
+    nuisances = slice(2, estimate.points.centres.stop + straight)
     count = int(group.max()) + 1
     # Of too many groups, neighbouring ones are joined.
     fold = (group if count <= _MOST_FOLDS else group * _MOST_FOLDS // count)[model.point]
@@ -143,8 +143,7 @@ def _widened(estimate: ProfileEstimate, factors: tuple[float, ...]) -> FloatArra
     """Profiles of Gaussians of several widths, shape (n, factors): smooth test functions."""
     model = estimate.model
     fit = estimate.gaussian
-    width = max(fit.sigma, 0.5 * estimate.points.step)
-    kernels = [gaussian_transfer(model.k, factor * width) for factor in factors]
+    kernels = [gaussian_transfer(model.k, factor * fit.width) for factor in factors]
     return model.signal(fit.geometry, np.stack(kernels, axis=1))
 
 

@@ -72,7 +72,7 @@ class Spots:
         volts = fit.points.standardised(every.signal(model, fit.centre), weights)
         square, vectors = np.linalg.eigh(volts.T @ volts)
         # Of uncorrelated spots, as large together as the Gaussian.
-        amplitude = _size(fit) * every.width * np.sqrt(4 * np.pi / count)
+        amplitude = fit.size * every.width * np.sqrt(4 * np.pi / count)
         shown = square * amplitude**2 > (_SHOWN * noise) ** 2
         return cls(axis, used, every.width, vectors[:, shown])
 
@@ -106,20 +106,13 @@ class Spots:
 def _moments(fit: GaussianFit) -> FloatArray:
     """Second moments of the Gaussian, in m^2."""
     e1, e2 = fit.ellipticity
-    width = max(fit.sigma, 0.5 * fit.points.step)
-    return np.asarray(width**2 * np.array([[1 + e1, e2], [e2, 1 - e1]]))
+    return np.asarray(fit.width**2 * np.array([[1 + e1, e2], [e2, 1 - e1]]))
 
 
 def _ellipses(fit: GaussianFit, places: FloatArray) -> FloatArray:
     """Distances of places (..., 2) from the centre, in ellipses of the Gaussian."""
     square = np.sum(places @ np.linalg.inv(_moments(fit)) * places, axis=-1)
     return np.asarray(np.sqrt(square))
-
-
-def _size(fit: GaussianFit) -> float:
-    """L2 norm of the round Gaussian, in V/Pa/m."""
-    width = max(fit.sigma, 0.5 * fit.points.step)
-    return float(fit.conversion_constant / (2 * np.sqrt(np.pi) * width))
 
 
 @array_record
@@ -180,9 +173,7 @@ def plane_departures(
     kept = square > _NEGLIGIBLE * square[-1]
     amplitudes = vectors[:, kept] * np.sqrt(square[kept])
     # All combinations that the scan can tell from the Gaussian's parameters.
-    axis = np.nonzero(fit.points.free)[1]
-    shifts = flat[:, 2 : 2 + axis.size] @ np.eye(2)[axis]
-    parameters = np.hstack([flat[:, :2], shifts, flat[:, -2:]])
+    parameters = np.hstack([flat[:, :2], fit.shifts(flat), flat[:, -2:]])
     parameters = parameters / np.linalg.norm(parameters, axis=0)
     alike = parameters.T @ by_spots @ (spots.shown.T @ amplitudes)
     return PlaneDepartures(spots, amplitudes @ np.linalg.svd(alike)[2][len(alike) :].T)
@@ -207,7 +198,7 @@ def _expected_covariance(
             far = np.sqrt(1 + 4 * smooth) * apart / length
             form = (1 + smooth * (far + far**2 / 3)) * np.exp(-far)
             covariance = form * np.multiply.outer(envelope, envelope)
-            covariances.append(covariance * (_size(fit) ** 2 / np.sum(covariance * overlap)))
+            covariances.append(covariance * (fit.size**2 / np.sum(covariance * overlap)))
             variance, turn = np.linalg.eigh(seen @ covariances[-1] @ seen.T)
             growth = 1 + np.multiply.outer(_STRENGTHS**2, np.maximum(variance, 0.0))
             logs.append(-0.5 * np.sum(np.log(growth) + (turn.T @ data) ** 2 / growth, axis=1))

@@ -164,10 +164,15 @@ class ScanPoints:
         return np.flatnonzero(self.curvature)
 
     @property
+    def centres(self) -> slice:
+        """Places of the free centres among the parameters of a Gaussian fit."""
+        return slice(2, 2 + int(self.free.sum()))
+
+    @property
     def curvatures(self) -> slice:
         """Places of the curvatures among the parameters of a Gaussian fit."""
         # After A, the width, centres and drifts, and baselines; before an ellipse.
-        last = 2 + 2 * int(self.free.sum()) + self.scans + self.curved.size
+        last = 2 * self.centres.stop - 2 + self.scans + self.curved.size
         return slice(last - self.curved.size, last)
 
     @property

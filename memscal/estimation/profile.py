@@ -150,8 +150,7 @@ class ProfileEstimate:
     def centres(self) -> FloatArray:
         """Centre of the sensor in each scan, shape (scans, 2), in m, departures allowed for."""
         corrected = self.gaussian.centre.copy()
-        free = self.points.free
-        corrected[free] += self.weighed.mean[2 : 2 + free.sum()]
+        corrected[self.points.free] += self.weighed.mean[self.points.centres]
         return corrected
 
     @property
@@ -162,8 +161,8 @@ class ProfileEstimate:
     @property
     def drifts(self) -> FloatArray:
         """Each scan's baseline and change over half the range along x (and y); curvatures (V)."""
-        first = 2 + int(self.points.free.sum())
-        return self.gaussian.drift + self.weighed.mean[first : self.points.curvatures.stop]
+        drifts = slice(self.points.centres.stop, self.points.curvatures.stop)
+        return self.gaussian.drift + self.weighed.mean[drifts]
 
     def oval_kernel(self, x: FloatArray, y: FloatArray) -> FloatArray:
         """What of A G is not round, on a grid (y, x) about the centre, in V/Pa/m^2."""
@@ -474,7 +473,7 @@ def _why_undetermined(estimate: ProfileEstimate, *, shown: bool) -> str:
             f"{varies}, but the forms that G may have differ in A by more than the noise: tails of "
             "G that fall slowly cannot be told from the baseline."
         )
-    centres = 2 + int(estimate.points.free.sum())
+    centres = estimate.points.centres.stop
     flat = estimate.basis.flat
     everything = np.arange(len(estimate.weighed.covariance))
     blocks = {
@@ -508,8 +507,7 @@ def constrained_profile(
     """Return the MAP estimate of A G under constraints; without any, the posterior mean."""
     if not (nonnegative or monotone):
         return estimate
-    width = max(estimate.gaussian.sigma, 0.5 * estimate.points.step)
-    r = np.linspace(0.0, _REACH_IN_WIDTHS * width, _RADII)
+    r = np.linspace(0.0, _REACH_IN_WIDTHS * estimate.gaussian.width, _RADII)
     profile = estimate.radial(r)
     columns = estimate.basis.radial(r)
     if monotone:

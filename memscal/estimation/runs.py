@@ -206,7 +206,7 @@ def compare_runs(estimate: ProfileEstimate) -> RunsApart | None:
     straight = 1 + points.free.sum(axis=1)
     place = (np.cumsum(straight) - straight)[points.scan[start]]
     baselines = estimate.gaussian.drift[place] + fit.coefficients[-count:]
-    place += 2 + int(points.free.sum())
+    place += points.centres.stop
     baselines += fit.coefficients[place]
     rows = fit.root[place] + fit.root[-count:]
     # Of two runs there is one difference.

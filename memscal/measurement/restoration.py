@@ -205,7 +205,7 @@ class Restoration(Result, Checked):
     def degrees(self) -> float:
         """Points less parameters without prior: outliers count by their weight."""
         estimate = self.posterior.estimate
-        parameters = 2 + int(self.points.free.sum()) + estimate.model.drift_columns.shape[1]
+        parameters = self.points.centres.stop + estimate.model.drift_columns.shape[1]
         return float(estimate.outlier_weight.sum() - parameters)
 
     @property
