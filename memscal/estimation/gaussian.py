@@ -149,30 +149,23 @@ def _robust_start_of_scan(model: ForwardModel, weights: FloatArray) -> FloatArra
     root = np.sqrt(weights)
     data = root * points.u
     drift = root[:, None] * model.straight_columns
-    best = np.zeros(0)
-    best_cost = np.inf
-    odd = []
-    for sigma, table in zip(widths, tables, strict=True):
-        shapes = np.interp(distances, radii, table) * (points.load * root)
-        if points.order:
-            shapes *= model.cosines(centres)
-            odd.append(shapes)
-        amplitudes, costs = _amplitudes(shapes, data, drift)
-        i = int(np.argmin(np.where(amplitudes > 0, costs, np.inf)))
-        if amplitudes[i] > 0 and costs[i] < best_cost:
-            baseline = np.linalg.lstsq(drift, data - amplitudes[i] * shapes[i], rcond=None)[0]
-            best = np.concatenate([[amplitudes[i], sigma], centres[i][points.free[0]], baseline])
-            best_cost = costs[i]
+    factors = points.load * root
+    odd = factors * model.cosines(centres) if points.order else factors
+    shapes = np.concatenate([np.interp(distances, radii, table) * odd for table in tables])
+    amplitudes, costs = _amplitudes(shapes, data, drift)
     if points.order:
         # The potential of a shear looks much as the normal stress does.
         potentials = wavenumbers.synthesise(spectra / model.k[:, None], radii).T
-        even = [np.interp(distances, radii, table) * (points.load * root) for table in potentials]
-        odd_trials = _amplitudes(np.concatenate(odd), data, drift)
+        even = [np.interp(distances, radii, table) * factors for table in potentials]
         even_trials = _amplitudes(np.concatenate(even), data, drift)
-        _require_parity(points, odd_trials, even_trials)
-    if not best.size:
+        _require_parity(points, (amplitudes, costs), even_trials)
+    i = int(np.argmin(np.where(amplitudes > 0, costs, np.inf)))
+    if not amplitudes[i] > 0:
         raise _undetermined(model)
-    return best
+    baseline = np.linalg.lstsq(drift, data - amplitudes[i] * shapes[i], rcond=None)[0]
+    sigma = widths[i // len(centres)]
+    centre = centres[i % len(centres)][points.free[0]]
+    return np.concatenate([[amplitudes[i], sigma], centre, baseline])
 
 
 def _amplitudes(
