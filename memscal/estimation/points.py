@@ -442,20 +442,14 @@ def joined_points(scans: Sequence[ScanPoints], owners: Sequence[int] | None = No
         problem = "Some of the scans state their noise (u_zz_errors) and others do not."
         cure = "State it in every scan, or leave it out of every one."
         raise InputError(problem, why="It determines their relative weights.", cure=cure)
-    repeats = []
-    numbers = []
-    first = 0
-    for i, points in enumerate(scans):
-        repeats.append(points.repeat + first)
-        numbers.append(np.full_like(points.scan, i))
-        first += int(points.repeat.max()) + 1
-    number = np.concatenate(numbers)
-    names = ("x", "y", "u", "load", "x_errors", "branch", "anew", "free", "curvature")
+    number = np.repeat(np.arange(len(scans)), [points.u.size for points in scans])
+    before = np.cumsum([0, *(int(points.repeat.max()) + 1 for points in scans)])
+    names = ("x", "y", "u", "load", "x_errors", "branch", "anew", "free", "curvature", "repeat")
     columns = {name: np.concatenate([getattr(each, name) for each in scans]) for name in names}
+    columns["repeat"] += before[number]
     return ScanPoints(
         **columns,
         u_errors=np.concatenate(stated) if stated else None,
-        repeat=np.concatenate(repeats),
         owner=number if owners is None else np.array(owners)[number],
         scan=number,
         missing=sum(points.missing for points in scans),
