@@ -23,8 +23,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import cached_property, lru_cache, reduce
-from operator import add
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
@@ -116,13 +115,13 @@ def _joined(
               \Big/ \sum_s \hat\sigma_s^2 / v_s
     """
     first = gains[0][0]
-    shares = [stress / np.sum(estimate.scattered(each) ** 2, axis=1) for stress, each in gains]
-    below = np.sum(
-        [stress * share for (stress, _), share in zip(gains, shares, strict=True)], axis=0
-    )
-    parts = [each * (first * share / below) for (_, each), share in zip(gains, shares, strict=True)]
-    joined: VoltageMap = reduce(add, parts)
-    return joined
+    above = VoltageMap(())
+    below = np.zeros_like(first)
+    for stress, gain in gains:
+        share = stress / np.sum(estimate.scattered(gain) ** 2, axis=1)
+        above += gain * share
+        below += stress * share
+    return above * (first / below)
 
 
 def _fitted(
