@@ -63,31 +63,28 @@ def free_model(estimate: ProfileEstimate, *, clip_outliers: bool = False) -> Fre
     if basis.angular:
         first.append(basis.angular.combined(basis.angular.components.signal(model, fit.centre)))
     columns, mix = model.framed(fit.geometry, first)
+    if mix is None:
+        columns = np.hstack([columns, model.signal(fit.geometry, kernels)])
+        mixed = np.eye(kernels.shape[1])
+    else:
+        mixed = mix @ kernels
     columns = points.standardised(columns, weights, out=columns)
     columns[~ordinary] = 0.0
     data = columns[point, 0]
-    q = None
-    if mix is None:
-        flat = columns[point, 1:]
-        rings = points.standardised(model.signal(fit.geometry, kernels), weights)[point]
-    else:
-        q, columns = orthonormalised(columns)
-        last = columns.shape[1] - len(mix)
-        flat = columns[:, 1:last]
-        rings = columns[:, last:] @ (mix @ kernels)
+    q, columns = orthonormalised(columns)
     # Angular departures are no parameters: what of them stands above the noise counts.
-    count = fit.jacobian.shape[1]
-    rings = np.hstack([flat[:, count:], rings])
-    flat = flat[:, :count]
+    _, flat, around, rings = np.split(
+        columns, [1, 1 + fit.jacobian.shape[1], columns.shape[1] - len(mixed)], axis=1
+    )
+    rings = np.hstack([around, rings @ mixed])
     base = np.linalg.qr(flat)[0]
     left, singular, _ = np.linalg.svd(rings - base @ (base.T @ rings), full_matrices=False)
     stated = points.u_errors is not None
     resolved = singular > _SHARE_OF_NOISE * (1.0 if stated else estimate.noise_scale)
     design = np.hstack([flat, left[:, resolved] * singular[resolved]])
-    if q is not None:
-        design = q @ design
-        del q, columns, flat, rings
-        design = design if ordinary.all() else design[point]
+    design = q @ design
+    del q
+    design = design if ordinary.all() else design[point]
     return FreeModel(data, design, point, stated)
 
 
