@@ -21,7 +21,6 @@ the base does the same work as the forces that hold its nodes; its integral is t
 from __future__ import annotations
 
 from functools import cached_property
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -55,12 +54,15 @@ class QuarticLine:
 
     def at(self, r: FloatArray) -> csr_array:
         """Return the matrix, shape (r.size, nodes), from nodal values to values at ``r``."""
-        side, along = _within(self.corners, r)
+        corners = self.corners
+        side = np.clip(np.searchsorted(corners, r, side="right") - 1, 0, corners.size - 2)
+        along = (r - corners[side]) / np.diff(corners)[side]
         columns = _DEGREE * side[:, None] + np.arange(_DEGREE + 1)
         # The five Lagrange quartics of a side.
         nodes = np.arange(_DEGREE + 1) / _DEGREE
         quartics = np.vander(along, _DEGREE + 1) @ np.linalg.inv(np.vander(nodes))
-        return _sparse(quartics, columns, self.r.size)
+        rows = np.arange(0, columns.size + 1, _DEGREE + 1)
+        return csr_array((quartics.ravel(), columns.ravel(), rows), shape=(r.size, self.r.size))
 
     @cached_property
     def mass(self) -> csr_array:
@@ -71,24 +73,12 @@ class QuarticLine:
 
     def loads_of_hats(self, rings: FloatArray) -> csr_array:
         r"""Return :math:`\int N_i \phi_j\,r\,dr` of the rings' hats, exactly."""
+        from scipy.interpolate import BSpline
+
         knots = np.union1d(rings, self.corners[self.corners < rings[-1]])
         nodes, weights = gauss_between(knots, _ORDER)
-        element, rising = _within(rings, nodes)
-        columns = np.stack([element, element + 1], axis=1)
-        hats = _sparse(np.stack([1 - rising, rising], axis=1), columns, rings.size)
+        hats = BSpline.design_matrix(nodes, np.pad(rings, 1, mode="edge"), 1)
         return csr_array(self.at(nodes).T @ hats.multiply((weights * nodes)[:, None]))
-
-
-def _within(edges: FloatArray, r: FloatArray) -> tuple[IndexArray, FloatArray]:
-    """Return the intervals that radii lie in, and the share of each that they have passed."""
-    i = np.clip(np.searchsorted(edges, r, side="right") - 1, 0, edges.size - 2)
-    return i, (r - edges[i]) / (edges[i + 1] - edges[i])
-
-
-def _sparse(values: FloatArray, columns: IndexArray, count: int) -> csr_array:
-    """Return the matrix of ``count`` columns that has a row of ``values`` at ``columns`` a row."""
-    rows = np.arange(0, columns.size + 1, columns.shape[1])
-    return csr_array((values.ravel(), columns.ravel(), rows), shape=(len(values), count))
 
 
 def smooth(line: QuarticLine, values: FloatArray, parity: int) -> ArrayFunction:
@@ -205,9 +195,15 @@ class MixedSystem:
 
 
 # A quartic triangle has 15 nodes, at quarters of its sides and of the lines between them: they
-# are the nodes of four quadratic triangles.
-_CORNERS = (((0, 0), (2, 0), (0, 2)), ((2, 0), (4, 0), (2, 2)), ((0, 2), (2, 2), (0, 4)),
-            ((2, 2), (0, 2), (2, 0)))  # fmt: skip
+# are the nodes of four quadratic triangles, here by their numbers in the element's own order.
+_QUARTERS = np.array(
+    [
+        (0, 4, 10, 3, 12, 9),
+        (4, 1, 7, 5, 6, 13),
+        (10, 7, 2, 14, 8, 11),
+        (7, 10, 4, 14, 12, 13),
+    ]
+)
 
 
 def field_mesh(system: MixedSystem, solution: FloatArray, film: ElasticFilm) -> FieldMesh:
@@ -246,23 +242,12 @@ def field_mesh(system: MixedSystem, solution: FloatArray, film: ElasticFilm) -> 
     points = film.thickness * np.stack([r, 1 - depth], axis=1)
     return FieldMesh(
         points=points,
-        triangles=anticlockwise(points, _quadratic_triangles(index, local)),
+        triangles=anticlockwise(points, np.concatenate(np.moveaxis(index[_QUARTERS], 2, 1))),
         displacement=film.thickness * displacement,
         stress=film.shear_modulus * np.stack([*stress, -slip], axis=1),
         notes=f"Linear elastic film, E = {film.young_modulus:g} Pa, nu = {film.poisson_ratio:g}, "
         f"thickness {film.thickness * 1e3:g} mm, bonded at z = 0. Stress positive in tension.",
     )
-
-
-def _quadratic_triangles(index: IndexArray, local: FloatArray) -> IndexArray:
-    """Return four quadratic triangles for each quartic one."""
-    place = {tuple(np.rint(_DEGREE * point).astype(int)): i for i, point in enumerate(local)}
-    quarters = []
-    for corners in _CORNERS:
-        around = [*corners, corners[0]]
-        middles = [((a[0] + b[0]) // 2, (a[1] + b[1]) // 2) for a, b in pairwise(around)]
-        quarters.append(index[[place[node] for node in (*corners, *middles)]].T)
-    return np.concatenate(quarters)
 
 
 # Tractions solved together: bounds the memory.
