@@ -38,11 +38,15 @@ from memscal.model.film import ElasticFilm
 
 
 def _series(terms: FloatArray, first: int) -> FloatArray:
-    """Return the Legendre series of the finite Fourier transform."""
-    series = np.zeros(2 * max(terms.size, 1))
-    if terms.size:
-        series[first::2] = terms * (-1.0) ** np.arange(terms.size)
+    """Return the Legendre series of which every second term is given, from the first on."""
+    series = np.zeros(2 * terms.size + 2)
+    series[first:-2:2] = terms
     return series
+
+
+def _alternating(terms: FloatArray) -> FloatArray:
+    """Return terms of the finite Fourier transform: with signs that take turns."""
+    return terms * (-1.0) ** np.arange(terms.size)
 
 
 def spherical_bessel(count: int, x: FloatArray) -> FloatArray:
@@ -101,18 +105,14 @@ class RodTraction:
         """Return the pressure at ``r`` (m) in Pa; zero from the edge outward."""
         _, m, under, scale = self._inside(r)
         # c_n = sqrt(pi) n! / Gamma(n + 1/2) gives each term the transform j_2n.
-        series = np.zeros(2 * self.pressure_terms.size)
-        series[::2] = self.pressure_terms * _term_scale(self.pressure_terms.size)
+        series = _series(self.pressure_terms * _term_scale(self.pressure_terms.size), 0)
         return np.where(under, (legendre.legval(m, series) / m) * scale, 0.0)
 
     def shear(self, r: FloatArray) -> FloatArray:
         """Return the radial traction at ``r`` (m) in Pa; zero from the edge outward."""
         ratio, m, under, scale = self._inside(r)
         count = self.shear_terms.size
-        if count == 0:
-            return np.zeros_like(m)
-        series = np.zeros(2 * count)
-        series[1::2] = self.shear_terms * _term_scale(count) / (2 * np.arange(count) + 1)
+        series = _series(self.shear_terms * _term_scale(count) / (2 * np.arange(count) + 1), 1)
         values = ratio * legendre.legval(m, legendre.legder(series)) / m
         return np.where(under, values * scale, 0.0)
 
@@ -129,9 +129,9 @@ class RodTraction:
         rho = r / self.radius
         # By j_2n(x) = (-1)^n int_0^1 P_2n(t) cos(xt) dt, of odd order with sines, and the Hankel
         # transforms of cosine and sine (Gradshteyn and Ryzhik 6.671); exact by Gauss quadrature.
-        even = _series(self.pressure_terms, 0)
-        odd = _series(self.shear_terms, 1)
-        share, weights = gauss_panels(1.0, 1.0, max(even.size, odd.size) + 24)
+        even = _series(_alternating(self.pressure_terms), 0)
+        odd = _series(_alternating(self.shear_terms), 1)
+        share, weights = gauss_panels(1.0, 1.0, even.size + 22)
 
         # t = c sin(theta) below c = min(rho, 1): the root sqrt(rho^2 - t^2) cancels against dt.
         inner = np.minimum(rho, 1.0)

@@ -17,9 +17,10 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
+from memscal.axisymmetry.hankel import gauss_between
 from memscal.errors import ConvergenceError
 from memscal.extensions.finite_strain.film_elements import FilmElements
-from memscal.mechanics.solver.step import Load, Target
+from memscal.mechanics.solver.step import Load, Target, reached
 from memscal.model.arrays import ArrayPair, FloatArray, IndexArray, array_record, value_record
 
 
@@ -73,7 +74,7 @@ _MOST_ITERATIONS = 30
 _CRUSHED = 0.1
 _SWOLLEN = 4.0
 _HARMLESS = 1e-5
-_SHARES = (1.0, 1 / 2, 1 / 4, 1 / 8, 1 / 16, 1 / 32)
+_SHARES = 0.5 ** np.arange(6)
 # A Newton step that moves something farther than so many thicknesses has diverged.
 _FARTHEST = 3.0
 # A node must lie this deep inside the indenter, in film thicknesses, to be taken in.
@@ -304,10 +305,6 @@ _LONGEST = 0.1
 _HALVINGS = 8
 
 
-def _value(state: Pressed, goal: Target) -> float:
-    return state.load if isinstance(goal, Load) else state.depth
-
-
 def work(states: list[Pressed]) -> float:
     """Return the integral of load over depth from the untouched film, by splines, in mJ."""
     from scipy.interpolate import CubicSpline
@@ -315,9 +312,8 @@ def work(states: list[Pressed]) -> float:
     # Over the number of the step, so that a path may turn back.
     number = np.arange(len(states) + 1)
     path = CubicSpline(number, [(0.0, 0.0), *((state.depth, state.load) for state in states)])
-    t, weights = np.polynomial.legendre.leggauss(4)
-    places = (number[:-1, None] + (t + 1) / 2).ravel()
-    return float(np.tile(weights / 2, len(states)) @ (path(places)[:, 1] * path(places, 1)[:, 0]))
+    places, weights = gauss_between(number, 4)
+    return float(weights @ (path(places)[:, 1] * path(places, 1)[:, 0]))
 
 
 class Path:
@@ -336,7 +332,7 @@ class Path:
                 self.states.append(self.pressing.press(guess, goal, guess))
                 yield 1.0
                 return
-        begin = _value(self.states[-1], goal) if self.states else 0.0
+        begin = reached(self.states[-1], goal) if self.states else 0.0
         halvings = 0
         way = goal.value - begin
         if np.isinf(self.length):
@@ -371,7 +367,7 @@ class Path:
     def _guess(self, goal: Target) -> Pressed:
         """Return the last state, carried on as it came as far as that is sound."""
         states = self.states[-3:] or [self.start]
-        values = np.array([_value(state, goal) for state in states])
+        values = np.array([reached(state, goal) for state in states])
         if np.any(np.diff(values) * np.sign(goal.value - values[-1]) <= 0):  # it turned back
             states = states[-1:]
             values = values[-1:]

@@ -18,6 +18,7 @@ from memscal.mechanics.solver.step import (
     Load,
     Target,
     Touch,
+    reached,
     take_step,
 )
 from memscal.model.arrays import array_record
@@ -38,8 +39,8 @@ def _overlaps(problem: ContactProblem, state: ContactState) -> bool:
 
 def _mixture(lower: ContactState, upper: ContactState, target: Target) -> ContactState:
     """Return the mixture of two states that is at ``target``; statuses are the second's."""
-    begin = _reached(lower, target)
-    end = _reached(upper, target)
+    begin = reached(lower, target)
+    end = reached(upper, target)
     share = (target.value - begin) / (end - begin)
     if not 0 <= share <= 1:
         raise ConvergenceError(
@@ -52,11 +53,6 @@ def _mixture(lower: ContactState, upper: ContactState, target: Target) -> Contac
         for name in ("pressure", "shear", "depth", "load", "anchor", "outward")
     }
     return replace(upper, **mixed)
-
-
-def _reached(state: ContactState, target: Target) -> float:
-    """Return the load or the depth of a state, as the target counts."""
-    return state.load if isinstance(target, Load) else state.depth
 
 
 def _step_at_once(problem: ContactProblem, smooth: ContactState, target: Target) -> ContactState:
@@ -84,11 +80,11 @@ def _between_rings(
     last = problem.heights.size - 1
     rings = min(rings, last)
     upper = meeting_at(rings)
-    while _reached(upper, target) < target.value and rings < last:
+    while reached(upper, target) < target.value and rings < last:
         rings += 1
         upper = meeting_at(rings)
     lower = meeting_at(rings - 1)
-    while _reached(lower, target) > target.value and rings > 2:
+    while reached(lower, target) > target.value and rings > 2:
         rings -= 1
         upper = lower
         lower = meeting_at(rings - 1)
@@ -179,11 +175,11 @@ def _step_by_step(
     upward = True
     farthest = max(target.value for target in targets)
     for target in targets:
-        if math.isclose(_reached(walk.state, target), target.value, rel_tol=1e-12):
+        if math.isclose(reached(walk.state, target), target.value, rel_tol=1e-12):
             # Nothing moves, and nothing that slipped is found to stick.
             yield walk.point()
             continue
-        rising = target.value > _reached(walk.state, target)
+        rising = target.value > reached(walk.state, target)
         if rising == upward:
             walk = resume
         try:
@@ -207,8 +203,8 @@ def _walk_ring_by_ring(walk: _Walk, target: Target, *, rising: bool) -> _Walk:
     problem = walk.problem
     while following := walk.ahead or _next_meeting(problem, walk.state, target, rising=rising):
         walk.ahead = None
-        begin = _reached(walk.state, target)
-        end = _reached(following, target)
+        begin = reached(walk.state, target)
+        end = reached(following, target)
         if not (begin < end <= target.value or begin > end >= target.value):
             # The path goes on from the ring before: a state between two rings changes no other.
             before = replace(walk, ahead=following)
@@ -219,7 +215,7 @@ def _walk_ring_by_ring(walk: _Walk, target: Target, *, rising: bool) -> _Walk:
     # step: everything grows in proportion.
     proportional = walk.state.load == 0 and problem.interface.rigid
     count = 1 if proportional else _STEPS_OF_A_FIXED_CONTACT
-    for value in np.linspace(_reached(walk.state, target), target.value, count + 1)[1:]:
+    for value in np.linspace(reached(walk.state, target), target.value, count + 1)[1:]:
         goal = replace(target, value=float(value))
         walk.step_to(take_step(problem, walk.state, goal, same_contact=True))
     return walk
@@ -228,7 +224,7 @@ def _walk_ring_by_ring(walk: _Walk, target: Target, *, rising: bool) -> _Walk:
 def _walk_evenly(walk: _Walk, target: Target, farthest: float, increments: int) -> None:
     """Go to a target in steps that are even in the contact radius of a sphere."""
     power = 3 if isinstance(target, Load) else 2
-    values = _reached(walk.state, target), target.value
+    values = reached(walk.state, target), target.value
     begin, end = ((value / farthest) ** (1 / power) for value in values)
     count = max(1, math.ceil(increments * abs(end - begin) - 1e-9))
     for share in np.linspace(begin, end, count + 1)[1:-1]:
@@ -264,7 +260,7 @@ def _next_meeting(
         states.append(state)
     # A contact with a hole has two edges: what meets, or parts, first comes next.
     nearest = min if rising else max
-    return nearest(states, key=lambda following: _reached(following, target), default=None)
+    return nearest(states, key=lambda following: reached(following, target), default=None)
 
 
 def _elastic_energy(problem: ContactProblem, state: ContactState) -> float:

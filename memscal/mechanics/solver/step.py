@@ -25,7 +25,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -100,6 +100,13 @@ class Touch:
 
 
 Target = Load | Depth
+
+
+def reached(state: Any, target: Target) -> float:
+    """Return the load or the depth of a state, as the target counts."""
+    return float(state.load if isinstance(target, Load) else state.depth)
+
+
 Goal = Load | Depth | Touch
 
 
@@ -278,16 +285,15 @@ def _revise(
     """Return a status that the trial does not contradict, and whether nothing changed."""
     p = trial.pressure
     separation = trial.separation
-    slip, tangential = _revised_slip(problem, status, trial, careful)
+    slip = _revised_slip(problem, status, trial, careful)
+    settled = np.array_equal(slip, status.slip)
     law = problem.interface.normal_law
-    normal = False
     if law is None:
-        pressing = _revised_contact(status, trial, held, careful=careful)
-        normal = not np.array_equal(pressing, status.pressing)
+        pressing = _revised_contact(status, trial, held, careful)
+        settled &= np.array_equal(pressing, status.pressing)
     else:
         separation = _revised_separation(problem.film, law, status, trial)
         pressing = _bearing(problem, law, separation)
-    settled = not (normal or tangential)
     stretch = status.stretch
     if not problem.interface.rigid:
         settled &= bool(np.abs(p - status.pressure).max() <= _SETTLED * p.max())
@@ -296,28 +302,29 @@ def _revise(
     return _Status(pressing, slip, status.anchor, separation, p, stretch), settled
 
 
-def _revised_contact(
-    status: _Status, trial: _Trial, held: int | None, *, careful: bool
-) -> BoolArray:
+def _changing(wrong: FloatArray, careful: bool) -> BoolArray:
+    """Return the rings whose status is too wrong to stay, or the worst of them alone."""
+    worst = np.arange(wrong.size) == np.argmax(wrong)
+    return (wrong > _SLACK) & (worst | (not careful))
+
+
+def _revised_contact(status: _Status, trial: _Trial, held: int | None, careful: bool) -> BoolArray:
     """Let go of rings that pull, and catch rings that would pass through the indenter."""
     pull = -trial.pressure / np.abs(trial.pressure).max(initial=1e-300)
     overlap = -trial.separation / max(abs(trial.depth), 1e-300)
     wrong = np.where(status.pressing, pull, overlap)
     if held is not None:
         wrong[held] = 0.0
-    changing = wrong > _SLACK
-    if careful and changing.any():
-        changing = np.arange(wrong.size) == np.argmax(wrong)
-    return status.pressing ^ changing
+    return status.pressing ^ _changing(wrong, careful)
 
 
 def _revised_slip(
     problem: ContactProblem, status: _Status, trial: _Trial, careful: bool
-) -> tuple[FloatArray, bool]:
+) -> FloatArray:
     """Let rings slip whose shear is too large, and stick that would be pushed on by friction."""
     mu = problem.friction
     if mu == 0 or np.isinf(mu):
-        return status.slip, False
+        return status.slip
     p = np.maximum(trial.pressure, 0.0)
     q = trial.shear
     u = trial.outward
@@ -329,19 +336,13 @@ def _revised_slip(
     # nothing slips.
     pushed = (status.slip * stretch + length) / (np.abs(u).max() + length)
     pushed *= problem.compliance.r > 0
-    wrong = np.where(sticks, excess, pushed) * status.pressing
-    changing = wrong > _SLACK
-    if not changing.any():
-        return status.slip, False
-    if careful:
-        changing = np.arange(wrong.size) == np.argmax(wrong)
+    changing = _changing(np.where(sticks, excess, pushed) * status.pressing, careful)
     # A ring that friction would push on far enough to slip back does so at once (the trial shear
     # of Alart and Curnier); sticking first, it could go back and forth for ever.
     turn = 2 * mu * p * np.diagonal(problem.compliance.radial)
     turns = np.abs(stretch) > np.maximum(turn, length)
     turned = np.where(turns, -np.sign(stretch), 0)
-    slip = np.where(changing, np.where(sticks, np.sign(q), turned), status.slip)
-    return slip, True
+    return np.where(changing, np.where(sticks, np.sign(q), turned), status.slip)
 
 
 def _revised_separation(
