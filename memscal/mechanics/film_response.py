@@ -278,8 +278,8 @@ class HankelFilm:
         k, weights = _wavenumbers(film, 2 * r[-1])
         normal, radial = (hat_transform(r.tobytes(), k.tobytes(), order) for order in (0, 1))
         half_space = (direct[0], *across, direct[1])
-        matrices = _displacements(film, r, k, weights, normal, radial, half_space)
-        return SurfaceCompliance(r, *matrices)
+        moved = _displacements(film, r, k, weights, normal, radial, half_space)
+        return SurfaceCompliance(r, np.block([[*moved[:2]], [*moved[2:]]]))
 
     discretisation = "Hankel transforms, Gauss-Legendre in k"
 

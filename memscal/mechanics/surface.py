@@ -31,20 +31,15 @@ from memscal.model.arrays import ArrayPair, BoolArray, FloatArray, IndexArray, a
 
 @array_record
 class SurfaceCompliance:
-    """Displacements at the rings by unit traction of every ring: (n, n) matrices in m/Pa."""
+    """Displacements at the rings by unit traction of every ring, in m/Pa."""
 
     r: FloatArray  # m, increasing from 0; a traction of the last ring falls to zero as a step
-    normal: FloatArray
-    normal_by_shear: FloatArray
-    radial_by_pressure: FloatArray
-    radial: FloatArray
+    whole: FloatArray  # depressions, then outward displacements, by pressures, then shears
 
-    @cached_property
-    def whole(self) -> FloatArray:
-        """Depressions, then outward displacements, by pressures, then shears: (2 n, 2 n)."""
-        return np.block(
-            [[self.normal, self.normal_by_shear], [self.radial_by_pressure, self.radial]]
-        )
+    @property
+    def radial(self) -> FloatArray:
+        """Each ring's outward displacement by its own shear."""
+        return np.diagonal(self.whole)[self.r.size :]
 
     @cached_property
     def products(self) -> FloatArray:

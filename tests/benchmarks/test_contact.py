@@ -29,10 +29,15 @@ def contact(problem):
     return follow(problem, [Load(2.75)], "incremental", 1)[0].state
 
 
+def normal_compliance(problem):
+    n = problem.heights.size
+    return problem.compliance.whole[:n, :n]
+
+
 def plain_contact(problem, depth):
     """The same contact at a given depth as non-negative least squares, a library's way."""
     pressing = problem.heights < depth
-    matrix = problem.compliance.normal[np.ix_(pressing, pressing)]
+    matrix = normal_compliance(problem)[np.ix_(pressing, pressing)]
     scale = matrix[0, 0]
     pressure, _ = nnls(matrix / scale, (depth - problem.heights[pressing]) / scale)
     whole = np.zeros(problem.heights.size)
@@ -50,7 +55,7 @@ def test_a_contact_costs_a_few_dense_solutions_and_less_than_least_squares(smoot
     assert at_depth.load == pytest.approx(2.75, rel=1e-9)
 
     def dense():
-        return np.linalg.solve(smooth.compliance.normal, right)
+        return np.linalg.solve(normal_compliance(smooth), right)
 
     ratio = turns(lambda: contact(smooth), dense, 15)
     show("frictionless contact, over a dense solution", ratio, 40)

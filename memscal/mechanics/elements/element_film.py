@@ -290,17 +290,18 @@ class ElementFilm:
         hats = line.loads_of_hats(rings).tocsc()
         seen = line.at(rings)
         scale = self.film.thickness / self.film.shear_modulus
-        moved = np.empty((2, 2, rings.size, rings.size))
+        # Direction and ring that moves by direction and ring of the traction.
+        moved = np.empty((2, rings.size, 2, rings.size))
         task = Task("tractions", 2 * rings.size)
         done = 0
         for source, unknowns in enumerate((inward, outward)):
             for batch in slices(rings.size, _BATCH):
                 solution = system.solve(unknowns, hats[:, batch].toarray())
-                moved[source, 0, :, batch] = scale * (seen @ solution[inward])
-                moved[source, 1, :, batch] = scale * (seen @ solution[outward])
+                moved[0, :, source, batch] = scale * (seen @ solution[inward])
+                moved[1, :, source, batch] = scale * (seen @ solution[outward])
                 done += rings[batch].size
                 task.tell(done)
-        return SurfaceCompliance(self.r, moved[0, 0], moved[1, 0], moved[0, 1], moved[1, 1])
+        return SurfaceCompliance(self.r, np.reshape(moved, (2 * rings.size, -1)))
 
     @property
     def discretisation(self) -> str:

@@ -207,7 +207,7 @@ def _add_tangential_compliance(
     length = problem.interface.slip_length
     limit = mu * np.maximum(status.pressure[stuck], 0.0)
     # The equation is divided by what keeps it of the size of the others, also where p vanishes.
-    size = limit + length / np.diagonal(problem.compliance.radial)[stuck]
+    size = limit + length / problem.compliance.radial[stuck]
     here = pressing.size + np.arange(stuck.size)
     matrix[here] *= (limit / size)[:, None]
     right[here] *= limit / size
@@ -339,7 +339,7 @@ def _revised_slip(
     changing = _changing(np.where(sticks, excess, pushed) * status.pressing, careful)
     # A ring that friction would push on far enough to slip back does so at once (the trial shear
     # of Alart and Curnier); sticking first, it could go back and forth for ever.
-    turn = 2 * mu * p * np.diagonal(problem.compliance.radial)
+    turn = 2 * mu * p * problem.compliance.radial
     turns = np.abs(stretch) > np.maximum(turn, length)
     turned = np.where(turns, -np.sign(stretch), 0)
     return np.where(changing, np.where(sticks, np.sign(q), turned), status.slip)
