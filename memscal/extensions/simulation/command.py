@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields, replace
+from inspect import signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -98,22 +99,19 @@ _SPHERE_NAMES = [each.name for each in _SPHERE.params]
 """The options that only an experiment with a sphere has."""
 
 
-def _shared_settings(options: Options) -> dict[str, Any]:
-    """Return what describes a rod scan and an experiment alike."""
+def _settings(function: Callable[..., Any], options: Options) -> Options:
+    """Return the arguments that options are of a function, by their names."""
     from memscal.extensions.simulation.disturbances import Disturbances
 
     names = [item.name for item in fields(Disturbances) if item.name in options]
     stated = {name: options[name] for name in names}
     stated["centre"] = (options["centre"], options["centre_y"])
     return {
+        **{name: options[name] for name in signature(function).parameters if name in options},
         "film": film_from(options),
         "rod": indenter_from("rod", options),
-        "rod_friction": options["rod_friction"],
         "kernel": kernel_from(options),
-        "conversion_constant": options["conversion_constant"],
-        "repeats": options["repeats"],
         "disturbances": Disturbances(**stated),
-        "seed": options["seed"],
     }
 
 
@@ -135,7 +133,7 @@ def _print_truth(scans: Mapping[Path, Scan], title: str) -> None:
     emit_tables(Table(f"Synthetic {title} (calculated, not measured) and its truth", head, rows))
 
 
-def _described(scan: Scan, path: Path) -> dict[str, Any]:
+def _described(scan: Scan, path: Path) -> Options:
     return {
         "scan": str(path),
         "synthetic": True,
@@ -263,13 +261,8 @@ def command(
 
     loads = options["loads"] or (1.0,)
     with working("Simulating"):
-        scan = simulate(
-            load=loads[0] if len(loads) == 1 else loads,
-            half_range=options["half_range"],
-            points=options["points"],
-            raster=options["raster"],
-            **_shared_settings(options),
-        )
+        load = loads[0] if len(loads) == 1 else loads
+        scan = simulate(load=load, **_settings(simulate, options))
     if laboratory:
         scan = with_laboratory(laboratory, replace(scan, sensor=StressSensor()))
     with together():
@@ -323,18 +316,15 @@ def _sphere(folder: Path, options: Options, as_json: bool, force: bool) -> None:
     _require_writable_folder(folder, overwrite=force)
     radius = {name: options[f"sphere_{name}"] for name in ("radius", "radius_uncertainty")}
     sphere: Any = indenter_from("sphere", radius)
+    settings = _settings(simulate_experiment, options)
+    settings["loads"] = options["loads"] or _LOADS
+    settings["points"] = options["contacts"]
     with working("Simulating"):
         made = simulate_experiment(
+            **settings,
             sphere=sphere,
             interface=interface_of(options),
             rod_points=options["points"],
-            loads=options["loads"] or _LOADS,
-            lubricated_loads=options["lubricated_loads"],
-            friction=options["friction"],
-            loading=options["loading"],
-            points=options["contacts"],
-            spacing=options["spacing"],
-            **_shared_settings(options),
         )
     scans = {folder / f"{name}.h5": scan for name, scan in made.scans.items()}
     with together(folder):
