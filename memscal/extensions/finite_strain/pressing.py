@@ -310,7 +310,7 @@ def work(states: list[Pressed]) -> float:
     from scipy.interpolate import CubicSpline
 
     # Over the number of the step, so that a path may turn back.
-    number = np.arange(len(states) + 1)
+    number = np.arange(len(states) + 1.0)
     path = CubicSpline(number, [(0.0, 0.0), *((state.depth, state.load) for state in states)])
     places, weights = gauss_between(number, 4)
     return float(weights @ (path(places)[:, 1] * path(places, 1)[:, 0]))

@@ -368,7 +368,9 @@ def least_design(
                 tried[count] = design if samples else None
             task.tell(len(tried))
         found = tried[count]
-        return found is not None and all(_met(found, *target) for target in targets.items())
+        return found is not None and all(
+            _progress(found, *target) >= 1 for target in targets.items()
+        )
 
     fails = fewest - 1
     works = fewest
@@ -406,9 +408,10 @@ def _reached(design: Design, name: str) -> float:
     return design.relative_uncertainty(name)
 
 
-def _met(design: Design, name: str, value: float) -> bool:
+def _progress(design: Design, name: str, value: float) -> float:
+    """Return how near a target is, or by how much it is surpassed: 1 where it is just met."""
     reached = _reached(design, name)
-    return reached >= value if name == "resolved_wavenumber" else reached <= value
+    return reached / value if name == "resolved_wavenumber" else value / reached
 
 
 def _in_words(name: str, value: float) -> str:
@@ -424,11 +427,8 @@ def _out_of_reach(what: str, targets: Targets, tried: list[Design]) -> FitError:
             f"No {what} makes a scan that can be calibrated with.",
             cure="Plan more repeats, less noise, a larger load or a larger half range.",
         )
-    name = next(n for n, v in targets.items() if not _met(tried[-1], n, v))
-    by_reached = partial(_reached, name=name)
-    best = min(tried, key=by_reached)
-    if name == "resolved_wavenumber":
-        best = max(tried, key=by_reached)
+    name = next(n for n, v in targets.items() if _progress(tried[-1], n, v) < 1)
+    best = max(tried, key=partial(_progress, name=name, value=targets[name]))
     goal = _in_words(name, targets[name])
     reached = _in_words(name, _reached(best, name))
     count = f"{best.plan.repeats} repeats"

@@ -304,8 +304,10 @@ def _revise(
 
 def _changing(wrong: FloatArray, careful: bool) -> BoolArray:
     """Return the rings whose status is too wrong to stay, or the worst of them alone."""
-    worst = np.arange(wrong.size) == np.argmax(wrong)
-    return (wrong > _SLACK) & (worst | (not careful))
+    changing = wrong > _SLACK
+    if careful:
+        changing &= np.arange(wrong.size) == np.argmax(wrong)
+    return changing
 
 
 def _revised_contact(status: _Status, trial: _Trial, held: int | None, careful: bool) -> BoolArray:
