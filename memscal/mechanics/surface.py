@@ -96,21 +96,13 @@ def singular_integrals(x: FloatArray, rings: FloatArray) -> ArrayPair:
     lengths = ends - starts
     share, weights = gauss_panels(1.0, 1.0, _ORDER)
     s = starts[:, None] + lengths[:, None] * share
-    measure = s * lengths[:, None] * weights
+    hats = np.stack([1 - share, share])[:, None] * (s * lengths[:, None] * weights)
     kernels = _kernels(x[:, None, None], s[None], np.abs(x[:, None, None] - s))
-    rising = measure * share
-    falling = measure * (1 - share)
+    integrals = np.einsum("kmeo,heo->hkme", kernels, hats)
     near = np.maximum(starts - x[:, None], x[:, None] - ends) < lengths
-
-    integrals = []
-    corrections = _near_integrals(x, starts, ends, near)
-    for kernel, (near_falling, near_rising) in zip(kernels, corrections, strict=True):
-        left = np.einsum("meo,eo->me", kernel, falling)
-        right = np.einsum("meo,eo->me", kernel, rising)
-        left[near] = near_falling
-        right[near] = near_rising
-        integrals.append(on_hats(left, right))
-    return integrals[0], integrals[1]
+    integrals[..., near] = _near_integrals(x, starts, ends, near)
+    normal, radial = on_hats(*integrals)
+    return normal, radial
 
 
 def coupling_integrals(x: FloatArray, rings: FloatArray) -> ArrayPair:
@@ -150,8 +142,8 @@ def _kernels(x: FloatArray, s: FloatArray, distance: FloatArray) -> ArrayPair:
 
 def _near_integrals(
     x: FloatArray, starts: FloatArray, ends: FloatArray, near: BoolArray
-) -> list[ArrayPair]:
-    """Integrate falling and rising hats over near elements, cut at the point; for each kernel."""
+) -> FloatArray:
+    """Integrate falling and rising hats over near elements, cut at the point, by each kernel."""
     point, element = np.nonzero(near)
     start = starts[element]
     end = ends[element]
@@ -161,15 +153,14 @@ def _near_integrals(
     u, weights = gauss_panels(1.0, 1.0, _NEAR_ORDER)
     v = u**_CROWDING
     weights = weights * _CROWDING * u ** (_CROWDING - 1)
-    totals = [(np.zeros(point.size), np.zeros(point.size)) for _ in range(2)]
+    totals = np.zeros((2, 2, point.size))
     for side in (start, end):
         outside = np.flatnonzero(side != cut)
         width = (side - cut)[outside, None]
         s = cut[outside, None] + width * v
         distance = np.abs(at - cut)[outside, None] + np.abs(width) * v
-        measure = np.abs(width) * weights * s
         rising = (s - start[outside, None]) / (end - start)[outside, None]
-        for total, kernel in zip(totals, _kernels(at[outside, None], s, distance), strict=True):
-            total[0][outside] += np.sum(kernel * measure * (1 - rising), axis=1)
-            total[1][outside] += np.sum(kernel * measure * rising, axis=1)
+        hats = np.stack([1 - rising, rising]) * (np.abs(width) * weights * s)
+        kernels = _kernels(at[outside, None], s, distance)
+        totals[..., outside] += np.einsum("kmo,hmo->hkm", kernels, hats)
     return totals

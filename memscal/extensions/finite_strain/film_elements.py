@@ -257,24 +257,24 @@ class FilmElements:
         return nodes[np.argsort(self.nodes[0][nodes], kind="stable")]
 
     @cached_property
-    def _shape(self) -> tuple[FloatArray, FloatArray, FloatArray, IndexArray, IndexArray]:
+    def _shape(self) -> tuple[FloatArray, FloatArray, FloatArray, IndexArray]:
         """Return gradients (cells, points, 5, 12), pressures, volumes and numbers of unknowns."""
         displacement, pressure = self.bases
         radius = np.asarray(displacement.global_coordinates())[0]
         gradients, pressures = _shapes(displacement, pressure, radius)
         volumes = 2 * np.pi * radius * displacement.dx
-        dofs = displacement.element_dofs.T
-        moving = np.concatenate([dofs, dofs + self.n], axis=1)
-        return gradients, pressures, volumes, moving, pressure.element_dofs.T + 2 * self.n
+        moving = displacement.element_dofs
+        dofs = np.concatenate([moving, moving + self.n, pressure.element_dofs + 2 * self.n])
+        return gradients, pressures, volumes, dofs.T
 
     def _state(self, x: FloatArray, shapes: Any = None) -> ArrayPair:
         """Return the deformation gradient (cells, points, 5) and the pressure (cells, points)."""
         gradients, pressures = shapes or self._shape[:2]
-        moving, pressing = self._shape[3:]
+        unknowns = x[self._shape[3]][:, :, None]
         cells, points = pressures.shape[:2]
-        F = (gradients.reshape(cells, -1, 12) @ x[moving][:, :, None]).reshape(cells, points, 5)
+        F = (gradients.reshape(cells, -1, 12) @ unknowns[:, :12]).reshape(cells, points, 5)
         F[..., [0, 3, 4]] += 1.0
-        return F, (pressures @ x[pressing][:, :, None])[..., 0]
+        return F, (pressures @ unknowns[:, 12:])[..., 0]
 
     def volume_ratio(self, x: FloatArray) -> FloatArray:
         """Return J at the points of integration, shape (cells, points)."""
@@ -294,19 +294,18 @@ class FilmElements:
     def forces(self, x: FloatArray) -> FloatArray:
         """Return the derivative of the energy: the forces (N) to apply to the nodes."""
         F, p = self._state(x)
-        gradients, pressures, volumes, moving, pressing = self._shape
+        gradients, pressures, volumes, dofs = self._shape
         cells = p.shape[0]
         stress = (self.material.stress(F, p) * volumes[..., None]).reshape(cells, -1)
         swelling = (determinant(F) - 1 + self.material.softness * p) * volumes
         pushed = (stress[:, None, :] @ gradients.reshape(cells, -1, 12))[:, 0]
-        dofs = np.concatenate([moving, pressing], axis=1).ravel()
-        values = np.concatenate([pushed, -(swelling[:, None, :] @ pressures)[:, 0]], axis=1).ravel()
-        return np.bincount(dofs, values, self.size).astype(np.float64)
+        values = np.concatenate([pushed, -(swelling[:, None, :] @ pressures)[:, 0]], axis=1)
+        return np.bincount(dofs.ravel(), values.ravel(), self.size).astype(np.float64)
 
     def tangent(self, x: FloatArray) -> sparse.csr_array:
         """Return the derivative of the forces by the unknowns: symmetric, of shape (size, size)."""
         F, p = self._state(x)
-        gradients, pressures, volumes, *_ = self._shape
+        gradients, pressures, volumes, dofs = self._shape
         cells = p.shape[0]
         stiffness = self.material.tangent(F, p) * volumes[..., None, None]
         flat = gradients.reshape(cells, -1, 12)
@@ -317,7 +316,6 @@ class FilmElements:
         weighted = pressures * (self.material.softness * volumes)[..., None]
         soft = against @ weighted
         whole = np.block([[stiff, couple.transpose(0, 2, 1)], [couple, soft]])
-        dofs = np.concatenate(self._shape[3:], axis=1)
         count = dofs.shape[1]
         entries = (np.repeat(dofs, count, axis=1).ravel(), np.tile(dofs, count).ravel())
         return sparse.coo_array((whole.ravel(), entries), shape=(self.size, self.size)).tocsr()
@@ -353,16 +351,10 @@ def _shapes(displacement: Any, pressure: Any, radius: FloatArray) -> ArrayPair:
     on_axis = radius < 1e-12
     for i, (field,) in enumerate(displacement.basis):
         value = np.broadcast_to(field, radius.shape)
-        slope = field.grad
+        slope = np.moveaxis(field.grad, 0, -1)
+        gradients[:, :, :2, i] = gradients[:, :, 2:4, 6 + i] = slope
         # u/r on the axis is the slope of u.
-        hoop = np.where(on_axis, slope[0], value / np.where(on_axis, 1.0, radius))
-        for row, column, derivative in (
-            (0, i, slope[0]),
-            (1, i, slope[1]),
-            (4, i, hoop),
-            (2, 6 + i, slope[0]),
-            (3, 6 + i, slope[1]),
-        ):
-            gradients[:, :, row, column] = derivative
+        hoop = np.where(on_axis, slope[..., 0], value / np.where(on_axis, 1.0, radius))
+        gradients[:, :, 4, i] = hoop
     pressures = [np.broadcast_to(field, radius.shape) for (field,) in pressure.basis]
     return gradients, np.stack(pressures, axis=-1)
