@@ -16,10 +16,10 @@ class Answers(Adapter):
         super().__init__()
         self.does = does
 
-    def _write(self, command: str, **_):
+    def _write(self, command, **_):
         self.answer = self.does(command)
 
-    def _read(self, **_) -> str:
+    def _read(self, **_):
         return self.answer
 
 

@@ -157,7 +157,7 @@ def parse(printed: str) -> dict[tuple[str, float], dict[int, FloatArray]]:
     return tables
 
 
-def _with_middles(corners: FloatArray) -> FloatArray:
+def _with_middles(corners):
     for axis in range(corners.ndim):
         ends = np.moveaxis(corners, axis, 0)
         both = np.empty((2 * len(ends) - 1, *ends.shape[1:]))
@@ -167,7 +167,7 @@ def _with_middles(corners: FloatArray) -> FloatArray:
     return corners
 
 
-def _film_deck(film: ElasticFilm, mesh: Mesh) -> list[str]:
+def _film_deck(film, mesh):
     exists = mesh.nodes > 0
     nodes = mesh.nodes
     points = zip(nodes[exists], mesh.r[exists], mesh.z[exists], strict=True)
@@ -188,11 +188,11 @@ def _film_deck(film: ElasticFilm, mesh: Mesh) -> list[str]:
     ]
 
 
-def _node_set(name: str, nodes: NDArray[np.int64]) -> list[str]:
+def _node_set(name, nodes):
     return [f"*NSET, NSET={name}", *(f"{node}," for node in nodes if node > 0)]
 
 
-def _base_stress(mesh: Mesh, base: dict[int, FloatArray]) -> FloatArray:
+def _base_stress(mesh, base):
     """Normal stress, quadratic on every element, that does the work of the reactions.
 
     The radial reactions are of no such use: CalculiX leaves out of them what the hoop stress on

@@ -5,7 +5,6 @@ here, on what the truth says: errors and mean errors of G and A, and how the sta
 with the errors, at every radius and from both sides.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import Any
@@ -256,21 +255,21 @@ class DiscsAtRandom(Case):
         return memscal.SmoothedDisc(float(radius), float(sigma)), 10 ** rng.uniform(-3.0, -2.0)
 
 
-def _gaussian(sigma: float) -> tuple[str, Kernel]:
+def _gaussian(sigma):
     return f"Gaussian {sigma:g}", memscal.GaussianMixture((1.0,), (sigma * 1e-3,))
 
 
-def _disc(radius: float, sigma: float, kind="disc") -> tuple[str, Kernel]:
+def _disc(radius, sigma, kind="disc"):
     disc = memscal.SmoothedDisc(radius=radius * 1e-3, sigma=sigma * 1e-3)
     return f"{kind} {radius:g}/{sigma:g}", disc
 
 
-def _sum(kind: str, weights: tuple[float, float], *sigmas: float) -> tuple[str, Kernel]:
+def _sum(kind, weights, *sigmas):
     label = f"{kind} {weights[0]:g}/{weights[1]:g} of {sigmas[0]:g}/{sigmas[1]:g}"
     return label, memscal.GaussianMixture(weights, tuple(s * 1e-3 for s in sigmas))
 
 
-def _cases() -> Iterator[Case]:
+def _cases():
     """Every noise, step and number of repeats with every kind of kernel, not their product."""
     narrow, middle, wide = (_gaussian(s) for s in (0.45, 0.561, 0.75))
     for i, kernel in enumerate((narrow, middle, wide)):
@@ -304,7 +303,7 @@ def _cases() -> Iterator[Case]:
             yield Case(*kernel, noise, step, repeats, (i + j) % 2 == 1)
 
 
-def _strangers() -> Iterator[Case]:
+def _strangers():
     """Sensors that the prior was not made from: sharp edges, wide tails, other forms."""
     for i, (radius, sigma) in enumerate([(0.8, 0.1), (1.0, 0.1), (1.0, 0.25), (0.6, 0.05)]):
         yield Case(*_disc(radius, sigma, "sharp disc"), 0.003, 0.25e-3, 2, i % 2 == 0)
@@ -395,7 +394,7 @@ class Outcome:
         """Return the limits that do not hold, beyond what the number of seeds leaves to chance."""
         return [name for name, holds in self._kept(limits) if not holds]
 
-    def _kept(self, limits: Limits) -> Iterator[tuple[str, bool]]:
+    def _kept(self, limits):
         seeds = self.g.size
         luck = chance(self.g.size)
         # One of many radii may exceed a limit by chance.

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Sequence
 from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 from helpers.paper import FILM, LOADS, SPHERE
@@ -77,7 +76,7 @@ def measured_profile(load: float, lubrication: str, friction: float, rng):
     )
 
 
-def _scan(lubrication: str):
+def _scan(lubrication):
     source = memscal.SourceFile(f"{lubrication or 'sphere'}.h5", "ef" * 32)
     return SimpleNamespace(
         source=source,
@@ -193,7 +192,7 @@ def interface_comparison(slip_length=1.8e-6) -> memscal.InterfaceComparison:
     return memscal.InterfaceComparison((1.6, 0.2), tangential, normal, messages)
 
 
-def _laws(lubrication: str, names, evidence, length: float, implied):
+def _laws(lubrication, names, evidence, length, implied):
     lengths = np.concatenate([[0.0], np.geomspace(0.05e-6, 50e-6, 120), [math.inf]])
     bounded = np.where(np.isinf(lengths), 20.0, np.log1p(lengths / 1e-6) / 0.1)
     chi_square = (bounded - math.log1p(length / 1e-6) / 0.1) ** 2 + 120.0
@@ -212,12 +211,12 @@ def _laws(lubrication: str, names, evidence, length: float, implied):
     return LawComparison(lubrication, loads, laws, (factor,), estimate, implied)
 
 
-def _joint(of_each: Sequence[memscal.LoadComparison], lubrication: str) -> memscal.BoundedEstimate:
+def _joint(of_each, lubrication):
     chosen = [one.by_profile for one in of_each if one.lubrication == lubrication]
     return reading(chosen[0].values, np.sum([one.deviance for one in chosen], axis=0))
 
 
-def _differences(profiles: Sequence[Any]) -> tuple[memscal.DryAgainstLubricated, ...]:
+def _differences(profiles):
     found = []
     dry_profiles = [p for p in profiles if p.lubrication == "dry"]
     lubricated = {p.load: p for p in profiles if p.lubrication == "lubricated"}

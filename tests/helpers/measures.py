@@ -4,7 +4,6 @@ import ast
 import io
 import tokenize
 from collections import Counter
-from collections.abc import Iterator
 from pathlib import Path
 
 NOT_READ = {
@@ -50,7 +49,7 @@ def most_arguments(path: Path) -> int:
     return max(counts, default=0)
 
 
-def _docstrings(tree: ast.Module) -> Iterator[tuple[int, int]]:
+def _docstrings(tree):
     """Yield where docstrings start."""
     for node in ast.walk(tree):
         if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef) and ast.get_docstring(
@@ -59,11 +58,11 @@ def _docstrings(tree: ast.Module) -> Iterator[tuple[int, int]]:
             yield node.body[0].lineno, node.body[0].col_offset
 
 
-def _is_parallel(node: ast.Assign) -> bool:
+def _is_parallel(node):
     targets = any(isinstance(target, ast.Tuple) for target in node.targets)
     return targets and isinstance(node.value, ast.Tuple)
 
 
-def _length(node: ast.FunctionDef) -> int:
+def _length(node):
     body = node.body[1:] if ast.get_docstring(node) else node.body
     return body[-1].end_lineno - body[0].lineno + 1 if body else 0

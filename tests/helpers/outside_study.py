@@ -256,7 +256,7 @@ def of_rubber(load: float) -> World:
     return NeoHookean(load=max(load, 1e-3))
 
 
-def _ratio_of_lobe(distance: float) -> float:
+def _ratio_of_lobe(distance):
     """Axis ratio, less one, of a sensor with a fifth of its sensitivity beside the line."""
     return math.sqrt(1 + 0.16 * (distance / SIGMA) ** 2) - 1
 

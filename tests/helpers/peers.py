@@ -80,7 +80,7 @@ class Plane:
         return contact.base_stress(radius)[back].reshape(self._radius.shape)
 
     @cached_property
-    def _radius(self) -> FloatArray:
+    def _radius(self):
         return np.hypot.outer(self.axis, self.axis)
 
     def radial(self, image: FloatArray) -> FloatArray:
