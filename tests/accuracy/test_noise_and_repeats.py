@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from helpers.bounds import FULL, RARE, deviates, root_mean_square, root_mean_square_limit
 from helpers.outside import ROUND, SIGMA, A, line, scan
+from helpers.scans import with_outlier
 from scipy.interpolate import make_interp_spline
 from scipy.stats import binom
 
@@ -50,9 +51,8 @@ def test_outliers_move_a_division_by_its_uncertainty_from_the_truth_and_the_othe
         made = scan(ROUND, seed)
         rng = np.random.default_rng([seed, 1])
         hit = rng.permutation(made.x.size)[: round(share * made.x.size)]
-        u = made.u_zz.copy()
-        u[hit] += rng.uniform(0.05, 0.5, hit.size) * u.max()
-        apparatus = memscal.calibrate(replace(made, u_zz=u)).apparatus
+        outlying = with_outlier(made, hit, rng.uniform(0.05, 0.5, hit.size))
+        apparatus = memscal.calibrate(outlying).apparatus
         assert apparatus.other is not None
         bayesian = apparatus.other.parameters["conversion_constant"]
         error = apparatus.conversion_constant - np.array([A, bayesian])

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from helpers.scans import simulate
+from helpers.scans import simulate, with_outlier
 
 import memscal
 from memscal.calibration import field_uncertainty
@@ -65,12 +65,6 @@ def test_a_correlation_of_neighbours_that_is_none_is_refused(band, found):
     assert found in str(refusal.value)
 
 
-def with_an_outlier(scan):
-    u = scan.u_zz.copy()
-    u[..., 20] += 0.3 * np.ptp(u)
-    return replace(scan, u_zz=u)
-
-
 def with_a_tail(raster):
     """The raster of a sensor that is not round, but has a tail along x."""
     return replace(raster, u_zz=raster.u_zz + 0.3 * np.roll(raster.u_zz, 2, axis=1))
@@ -85,7 +79,7 @@ CASES = {
     ),
     "correlated noise": (correlated(LINE), {}),
     "correlated with neighbours": (correlated_with_neighbours(LINE, 4)[1], {}),
-    "outlier": (with_an_outlier(LINE), {}),
+    "outlier": (with_outlier(LINE, (..., 20), 0.3), {}),
     "loads": ([simulate(noise=0.005, seed=i, load=0.1 * i) for i in (1, 2, 3)], {}),
     "source": (LINE, {"reference": "disc:0.4mm"}),
     "raster": (with_a_tail(RASTER), {}),

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from helpers.bounds import FULL
-from helpers.scans import estimated, simulated
+from helpers.scans import estimated, simulated, with_outlier
 from scipy.stats import binom, chi2
 
 from memscal.estimation.model_tests import hold_out, load_groups
@@ -87,9 +87,7 @@ def test_a_signal_that_is_not_linear_in_load_is_found_by_the_load_held_out():
 
 def test_one_outlier_does_not_condemn_its_repeat():
     scan = simulated(repeats=3)
-    u = scan.u_zz.copy()
-    u[1, 30] += 0.5 * u.max()
-    estimate = estimated(replace(scan, u_zz=u))
+    estimate = estimated(with_outlier(scan, (1, 30), 0.5))
     assert hold_out(estimate, estimate.points.repeat).p_value > 1e-3
 
 

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from helpers.scans import simulated
+from helpers.scans import simulated, with_outlier
 
 from memscal.errors import InputError
 from memscal.estimation.points import measured_points, scans_by_load
@@ -52,10 +52,7 @@ def test_a_scan_that_cannot_be_calibrated_is_refused_with_its_reason(change, wor
 
 
 def test_a_negative_outlier_is_no_wrong_sign():
-    scan = simulated()
-    u = scan.u_zz.copy()
-    u[5] -= 10 * u.max()
-    assert measured_points(replace(scan, u_zz=u)).u.size == 65
+    assert measured_points(with_outlier(simulated(), 5, -10.0)).u.size == 65
 
 
 @pytest.mark.parametrize("correlation", [0.0, 0.4])

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from helpers.bounds import FULL, root_mean_square_range
-from helpers.scans import CONVERSION, RING, TAILS, estimated, simulated
+from helpers.scans import CONVERSION, RING, TAILS, estimated, simulated, with_outlier
 
 import memscal
 from memscal.errors import FitError
@@ -38,9 +38,7 @@ def test_stated_noise_that_is_too_small_is_raised_and_never_lowered():
 def test_an_outlier_is_found_weighed_down_and_moves_nothing(height):
     scan = simulated(noise=0.002)
     clean = estimated(scan)
-    u = scan.u_zz.copy()
-    u[20] += height * clean.largest_signal
-    spoilt = estimated(replace(scan, u_zz=u))
+    spoilt = estimated(with_outlier(scan, 20, height))
     assert spoilt.outlier_weight[20] < 1e-3
     assert np.sum(spoilt.outlier_weight < 0.5) <= 1 + np.sum(clean.outlier_weight < 0.5)
     shift = abs(spoilt.conversion_constant - clean.conversion_constant)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from helpers.bounds import FULL
-from helpers.scans import as_points, estimated, simulated
+from helpers.scans import as_points, estimated, simulated, with_outlier
 from scipy.stats import binom, chi2, f
 
 from memscal.estimation.residuals import (
@@ -42,10 +42,7 @@ def test_residuals_keep_the_misfit_s_size_and_lose_one_for_each_column(options):
 
 
 def test_an_outlier_is_left_out_of_the_residuals():
-    scan = simulated(noise=0.005)
-    u = scan.u_zz.copy()
-    u[20] += 0.5 * u.max()
-    residuals = residuals_of(estimated(replace(scan, u_zz=u)))
+    residuals = residuals_of(estimated(with_outlier(simulated(noise=0.005), 20, 0.5)))
     assert 20 not in residuals.point
     assert chi_square_test(residuals).p_value > 1e-6
 

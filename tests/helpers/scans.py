@@ -92,6 +92,13 @@ def as_points(scan: Scan, seed=0) -> Scan:
     return replace(scan, **changes, repeat=scan.passes.ravel()[order], channels={})
 
 
+def with_outlier(scan: Scan, place, share) -> Scan:
+    """Add a share of the largest reading to the reading at a place."""
+    u = scan.u_zz.copy()
+    u[place] += share * u.max()
+    return replace(scan, u_zz=u)
+
+
 def plane_error(r: np.ndarray, found: np.ndarray, truth: np.ndarray) -> float:
     """Relative L2 error over the plane, for a radial function on even radii."""
     return float(np.sqrt(np.sum(r * (found - truth) ** 2) / np.sum(r * truth**2)))

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from helpers import scans as made
 from helpers.bounds import FULL, cramer_rao, root_mean_square_range
-from helpers.scans import simulate
+from helpers.scans import simulate, with_outlier
 from scipy.stats import chi2
 
 import memscal
@@ -172,9 +172,7 @@ def test_a_wrong_unit_of_the_voltage_fails_the_check_of_the_force():
 
 def test_a_spoilt_point_is_named_and_moves_little():
     scan = made.sphere_scan(made.pressed(), seed=4)
-    u = scan.u_zz.copy()
-    u[14] *= 1.5
-    clean, spoilt = (memscal.restore(s, EXACT) for s in (scan, replace(scan, u_zz=u)))
+    clean, spoilt = (memscal.restore(s, EXACT) for s in (scan, with_outlier(scan, 14, 0.5)))
     assert any(message.kind == "outlier" for message in spoilt.messages)
     assert abs(spoilt.stress(0.0) - clean.stress(0.0)) < 2 * clean.stress_uncertainty(0.0)
 
