@@ -149,26 +149,25 @@ def _column(poisson: float, radius: float, *, sticking: bool) -> tuple[_Rows, fl
     count = ends[_polynomial(tuple(ratios[i : i + 2]), poisson) != 0].min()
     if count < _STENCIL:
         return None
-    rows = np.empty((count, columns.shape[-1]))
+    rows = []
     for n in range(count):
-        at_ratios = np.empty((ratios.size, columns.shape[-1]))
-        usable = []
+        at_ratios = {}
         for m in range(ratios.size):
             nodes = _nearest(np.flatnonzero(reached[m] > n), j)
             if {j, j + 1} <= set(nodes):
-                usable.append(m)
                 weights = _polynomial(tuple(np.log(radii[nodes])), np.log(radius))
                 at_ratios[m] = weights @ columns[m, nodes, n]
-        chosen = _nearest(np.array(usable), i)
-        rows[n] = _polynomial(tuple(ratios[chosen]), poisson) @ at_ratios[chosen]
-    flat: Any = ((1, np.zeros(rows.shape[1])), "not-a-knot")
+        chosen = _nearest(at_ratios, i)
+        weights = _polynomial(tuple(ratios[chosen]), poisson)
+        rows.append(weights @ [at_ratios[m] for m in chosen])
+    flat: Any = ((1, np.zeros(columns.shape[-1])), "not-a-knot")
     spline = CubicSpline(np.cbrt(depths[:count]), rows, bc_type=flat)
     return spline, float(depths[count - 1])
 
 
 def _nearest(nodes: Any, place: Any) -> list[int]:
     """Return up to four of the nodes around the interval after a place."""
-    order = sorted(nodes.tolist(), key=lambda node: abs(node - place - 0.5))
+    order = sorted(nodes, key=lambda node: abs(node - place - 0.5))
     return sorted(order[:_STENCIL])
 
 

@@ -157,11 +157,18 @@ class DrawnScans:
 
     @cached_property
     def _nominal(self) -> list[FloatArray]:
+        scans = self.solution.scans
+        return self._rods([replace(scan, film=scan.film and scan.film.expected) for scan in scans])
+
+    def _rods(self, scans: Sequence[Scan]) -> list[FloatArray]:
+        """Transform of each scan's rod, by the law of its own; zero where there is no film."""
         spectra = []
         references = self.solution.estimate.model.references
-        for scan, reference in zip(self.solution.scans, references, strict=True):
-            expected = replace(scan, film=scan.film and scan.film.expected)
-            spectra.append(_rod(expected, reference, scan))
+        for scan, own, reference in zip(scans, self.solution.scans, references, strict=True):
+            spectrum = np.zeros_like(reference.values)
+            if own.film is not None:
+                spectrum = rod_spectrum(scan.set_up, reference, law_at_once(own.set_up))
+            spectra.append(spectrum)
         return spectra
 
     def _reference_changes(self, standard: Arrays) -> tuple[RadialSpectrum, ...]:
@@ -175,26 +182,16 @@ class DrawnScans:
                 scans[i] = replace(scans[i], **{item.component: owner})
         references = self.solution.estimate.model.references
         changes = []
-        for i, (scan, reference) in enumerate(zip(scans, references, strict=True)):
-            nominal = self._nominal[i]
-            change = _rod(scan, reference, self.solution.scans[i]) - nominal
+        for true, nominal, own in zip(self._rods(scans), self._nominal, references, strict=True):
             blank = np.zeros_like(nominal)
-            ratio = np.divide(reference.values, nominal, out=blank, where=nominal != 0)
-            values = change * ratio
-            changes.append(replace(reference, values=values))
+            ratio = np.divide(own.values, nominal, out=blank, where=nominal != 0)
+            changes.append(replace(own, values=(true - nominal) * ratio))
         return tuple(changes)
 
     def _results_of(self, solution: Solution) -> FloatArray:
         numbers, g = read_off(solution.deconvolution, self.solution.deconvolution.g.r)
         numbers["gaussian_sigma"] = solution.estimate.gaussian.sigma
         return np.array([*(numbers[name] for name in BUDGETED), *g])
-
-
-def _rod(scan: Scan, reference: RadialSpectrum, own: Scan) -> FloatArray:
-    """Transform of a scan's rod, by the law of its own; zero where nothing hangs on a film."""
-    if own.film is None:
-        return np.zeros_like(reference.values)
-    return rod_spectrum(scan.set_up, reference, law_at_once(own.set_up))
 
 
 def _with_voltages(scan: Scan, channel: str, voltages: FloatArray) -> Scan:
