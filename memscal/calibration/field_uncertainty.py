@@ -35,6 +35,7 @@ from memscal.estimation.voltage_map import BLOCK, square_root
 from memscal.model.arrays import (
     ArrayFunction,
     ArrayPair,
+    ArrayTriple,
     BoolArray,
     FloatArray,
     IndexArray,
@@ -228,7 +229,7 @@ def _by_parameters(
     inside: IndexArray,
     taper: FloatArray,
     division: _Filter,
-) -> tuple[FloatArray, FloatArray, FloatArray]:
+) -> ArrayTriple:
     """What errors of the parameters do to A G (inside, p); what the window hides, and its sums."""
     # Hidden of the posterior's kernels and of its mean, (inside, p + 1) and summed over all nodes.
     # An error of the parameters moves what was fitted around the raster and the frame that G is

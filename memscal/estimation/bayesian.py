@@ -38,6 +38,7 @@ from memscal.estimation.departures import (
 )
 from memscal.estimation.voltage_map import VoltageMap
 from memscal.model.arrays import (
+    ArrayTriple,
     FloatArray,
     IndexArray,
     array_record,
@@ -227,7 +228,7 @@ def _likelihoods(
     signal: FloatArray,
     power: FloatArray,
     noise: _Noise,
-) -> tuple[FloatArray, FloatArray, FloatArray]:
+) -> ArrayTriple:
     """Log marginal likelihoods, variances of the residuals, and of the noise, (h,) each."""
     total = np.sum(sensors.rest**2, axis=1) + noise.added * noise.freedom
     least = (_ROUNDING * np.abs(sensors.data).max(axis=1)) ** 2

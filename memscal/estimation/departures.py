@@ -32,7 +32,7 @@ from memscal.estimation.forward import ForwardModel
 from memscal.estimation.gaussian import GaussianFit
 from memscal.estimation.plane import PlaneDepartures, Spots
 from memscal.estimation.voltage_map import SINGLE, Tall, VoltageMap, orthonormalised
-from memscal.model.arrays import FloatArray, array_record, value_record
+from memscal.model.arrays import ArrayPair, FloatArray, array_record, value_record
 
 #: Neighbouring rings overlap: this share of their blur apart.
 _SPACING = 0.7
@@ -303,7 +303,7 @@ class DepartureBasis:
             self._tables[key] = table
         return self._tables[key]
 
-    def _sensor(self, place: FloatArray, side: Side) -> tuple[FloatArray, FloatArray]:
+    def _sensor(self, place: FloatArray, side: Side) -> ArrayPair:
         """Columns by A and width of the sensor that the others depart from."""
         slope = self.conversion_constant * side.slope(place, self.sigma)
         return side.gaussian(place, self.sigma), slope

@@ -3,7 +3,7 @@
 import numpy as np
 
 from memscal.estimation.forward import ForwardModel, Geometry
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import ArrayPair, FloatArray
 
 #: Largest ellipticity, and steps of the centred differences by which the response is derived.
 _LARGEST = 0.95
@@ -18,7 +18,7 @@ def bounded(ellipticity: FloatArray) -> FloatArray:
 
 def elliptic_columns(
     model: ForwardModel, geometry: Geometry, sigma: float, ellipticity: FloatArray
-) -> tuple[FloatArray, FloatArray]:
+) -> ArrayPair:
     """Response per A of an elliptic Gaussian and its derivatives by s, e1, e2; by the centre."""
     # Shapes (n, 4), and (2, n) of each point's own centre.
     here = np.append(sigma, ellipticity)

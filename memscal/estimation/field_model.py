@@ -17,7 +17,13 @@ import scipy.fft
 from memscal.axisymmetry.hankel import RadialSpectrum
 from memscal.axisymmetry.kernels import gaussian_transfer
 from memscal.estimation.forward import ForwardModel, Geometry
-from memscal.model.arrays import FloatArray, IndexArray, array_record, keyword_array_record
+from memscal.model.arrays import (
+    ArrayPair,
+    FloatArray,
+    IndexArray,
+    array_record,
+    keyword_array_record,
+)
 from memscal.model.stress import StressField
 
 #: Points of the grid for each half wave of the last wavenumber, and at most for each step.
@@ -96,7 +102,7 @@ class FieldModel(ForwardModel):
         shift = self.shift_derivative(geometry, kernel)
         return np.asarray(np.sum(geometry.towards * shift, axis=0))
 
-    def elliptic(self, geometry: Geometry, ellipses: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def elliptic(self, geometry: Geometry, ellipses: FloatArray) -> ArrayPair:
         """Responses (m, n) per A to (s, e1, e2), (m, 3); slopes (2, n) of the first by place."""
         kx = self._plane.kx
         ky = self._plane.ky

@@ -31,7 +31,7 @@ from memscal.axisymmetry.hankel import ACROSS, RadialSpectrum, bessel, radial_sp
 from memscal.axisymmetry.kernels import gaussian_transfer
 from memscal.estimation.points import ScanPoints
 from memscal.estimation.voltage_map import BLOCK, DENSE
-from memscal.model.arrays import BoolArray, FloatArray, array_record, slices
+from memscal.model.arrays import ArrayPair, ArrayTriple, BoolArray, FloatArray, array_record, slices
 from memscal.model.sizes import too_large
 
 if TYPE_CHECKING:
@@ -100,7 +100,7 @@ def wave_table(wave: int, across: bool, reach: float, nodes: bytes) -> WaveTable
 @lru_cache(maxsize=8)
 def _seen_waves(
     wave: int, across: bool, reach: float, nodes: bytes, share: int, factors: bytes
-) -> tuple[FloatArray, FloatArray, FloatArray]:
+) -> ArrayTriple:
     """Singular values (f,) and vectors (f, nodes) of a table times factors; splines (t, f)."""
     table = wave_table(wave, across, reach, nodes)
     factor = np.frombuffer(factors)
@@ -328,7 +328,7 @@ class ForwardModel:
         free = np.argwhere(self.points.free)
         return np.stack([np.where(scan == i, shift[axis], 0.0) for i, axis in free], axis=1)
 
-    def elliptic(self, geometry: Geometry, ellipses: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def elliptic(self, geometry: Geometry, ellipses: FloatArray) -> ArrayPair:
         """Responses (m, n) per A to (s, e1, e2), (m, 3); slopes (2, n) of the first by place."""
         toward, across = geometry.towards
         angle = np.arctan2(-across, -toward)

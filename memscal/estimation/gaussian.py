@@ -18,7 +18,7 @@ from memscal.estimation.forward import ForwardModel, Geometry
 from memscal.estimation.outliers import robust_scale
 from memscal.estimation.points import ScanPoints
 from memscal.estimation.voltage_map import VoltageMap, evenly, triangular
-from memscal.model.arrays import TINY, FloatArray, IndexArray, array_record
+from memscal.model.arrays import TINY, ArrayPair, FloatArray, IndexArray, array_record
 
 _MOST_STEPS = 20
 _MOST_HALVINGS = 5
@@ -27,7 +27,7 @@ _LONGEST_STEP = 1.0
 #: Rounding may raise a cost that has settled by this share.
 _ROUNDING = 1e-10
 
-Linearised = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
+Linearised = Callable[[FloatArray], ArrayPair]
 
 
 def gauss_newton(
@@ -70,9 +70,7 @@ def gauss_newton(
 _CLEARLY = 0.7
 
 
-def _require_parity(
-    points: ScanPoints, odd: tuple[FloatArray, FloatArray], even: tuple[FloatArray, FloatArray]
-) -> None:
+def _require_parity(points: ScanPoints, odd: ArrayPair, even: ArrayPair) -> None:
     """Refuse a voltage that a shear of the other sign, or an even signal, fits far better."""
     # ``odd`` and ``even``: amplitudes of trial signals, and sums of absolute residuals, shape (m,).
     amplitudes, costs = odd
@@ -168,9 +166,7 @@ def _robust_start_of_scan(model: ForwardModel, weights: FloatArray) -> FloatArra
     return np.concatenate([[amplitudes[i], sigma], centre, baseline])
 
 
-def _amplitudes(
-    shapes: FloatArray, data: FloatArray, drift: FloatArray
-) -> tuple[FloatArray, FloatArray]:
+def _amplitudes(shapes: FloatArray, data: FloatArray, drift: FloatArray) -> ArrayPair:
     """Fit each row of shapes beside the drift: its amplitude, the sum of absolute residuals."""
     base = np.linalg.qr(drift)[0]
     free = shapes - (shapes @ base) @ base.T
@@ -255,7 +251,7 @@ class GaussianFit:
         return columns[:, self.points.centres] @ np.eye(2)[axis]
 
     @property
-    def prior(self) -> tuple[FloatArray, FloatArray]:
+    def prior(self) -> ArrayPair:
         """Further rows (c, p) of the jacobian by the curvatures' prior, and their residuals."""
         rows = self.points.prior_rows[:, : self.jacobian.shape[1]]
         curvature = self.drift[self.drift.size - len(rows) :]
@@ -328,7 +324,7 @@ def _solve(
     # Of many points there is room for one.
     del fit
 
-    def linearised(scaled: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def linearised(scaled: FloatArray) -> ArrayPair:
         key = scaled.tobytes()
         if key not in last:
             last.clear()

@@ -22,7 +22,7 @@ from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.reference_spectra import difference, spectrum_difference
 from memscal.mechanics.film_response import base_response
 from memscal.mechanics.press_rod import is_tabulated, press_rod, stick_and_slide
-from memscal.model.arrays import FloatArray, array_record
+from memscal.model.arrays import ArrayPair, FloatArray, array_record
 from memscal.model.film import LINEAR, NEO_HOOKEAN
 from memscal.model.indenter import Rod
 from memscal.model.scan import Scan
@@ -106,9 +106,7 @@ def signal_by(estimate: ProfileEstimate, changes: Sequence[FloatArray]) -> Float
     return model.signal(estimate.gaussian.geometry, estimate.kernel)
 
 
-def _film_changes(
-    scan: Scan, estimate: ProfileEstimate, number: int
-) -> dict[str, tuple[FloatArray, FloatArray]]:
+def _film_changes(scan: Scan, estimate: ProfileEstimate, number: int) -> dict[str, ArrayPair]:
     """Changes of one scan's reference by one unit of each property of its film, and its square."""
     reference = estimate.model.references[number]
     if scan.film is None or scan.indenter is None or reference.source:

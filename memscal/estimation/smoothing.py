@@ -33,7 +33,7 @@ from memscal.axisymmetry.hankel import ACROSS, RadialSpectrum, Wavenumbers, gaus
 from memscal.axisymmetry.kernels import gaussian_transfer
 from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.voltage_map import DENSE, VoltageMap
-from memscal.model.arrays import FloatArray, IndexArray, array_record
+from memscal.model.arrays import ArrayTriple, FloatArray, IndexArray, array_record
 from memscal.model.checks import OUTLIER_WEIGHT
 
 if TYPE_CHECKING:
@@ -220,7 +220,7 @@ def _restricted_likelihood(values: FloatArray, data: FloatArray, total: float, c
     relative = values**2 / values[0] ** 2
     power = data**2
 
-    def ratios(logarithms: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def ratios(logarithms: FloatArray) -> ArrayTriple:
         ratio = relative / np.exp(logarithms)[:, None]
         kept = ratio / (1 + ratio)
         return ratio, kept, np.maximum(total - kept @ power, _LEAST * total)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from memscal.estimation.decorrelation import Decorrelation
-from memscal.model.arrays import FloatArray, IndexArray, array_record, slices
+from memscal.model.arrays import ArrayPair, FloatArray, IndexArray, array_record, slices
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
@@ -144,7 +144,7 @@ def triangular(columns: FloatArray) -> FloatArray:
 
 def orthonormalised(
     columns: FloatArray, size: FloatArray | None = None, dependent: float = _DEPENDENT
-) -> tuple[FloatArray, FloatArray]:
+) -> ArrayPair:
     """Orthonormal columns Q (n, r) of the same span, and R (r, f): the columns are Q R.
 
     The columns are overwritten by Q; what is dependent is judged by their ``size`` or norms, (f,).

@@ -29,7 +29,15 @@ from memscal.errors import InputError
 from memscal.friction.family import ProfileFamily
 from memscal.friction.marginal_likelihood import Statistics, added, log_likelihood
 from memscal.measurement.posterior import input_changes, sensor_changes, shared_changes
-from memscal.model.arrays import ArrayPair, Arrays, FloatArray, IndexArray, Values, array_record
+from memscal.model.arrays import (
+    ArrayPair,
+    Arrays,
+    ArrayTriple,
+    FloatArray,
+    IndexArray,
+    Values,
+    array_record,
+)
 from memscal.model.measured_stress import MeasuredProfile, MeasuredScan
 from memscal.model.scan import Scan
 
@@ -513,9 +521,7 @@ class Likelihood:
             loads.append(replace(moved, slope=np.zeros_like(load.slope)))
         return replace(self, loads=tuple(loads))
 
-    def averaged_over(
-        self, held: Likelihood, weights: FloatArray
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def averaged_over(self, held: Likelihood, weights: FloatArray) -> ArrayTriple:
         """Average the likelihood over values (W,) of other loads; all share systematic errors.
 
         Return log likelihood and mean chi-square, (V,), and the mean of the other loads' value.

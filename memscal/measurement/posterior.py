@@ -44,7 +44,14 @@ from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.reference_spectra import law_at_once, law_sensitivities, rod_spectrum
 from memscal.estimation.voltage_map import VoltageMap
 from memscal.mechanics.film_response import base_response
-from memscal.model.arrays import ArrayPair, Arrays, FloatArray, array_record, value_record
+from memscal.model.arrays import (
+    ArrayPair,
+    Arrays,
+    ArrayTriple,
+    FloatArray,
+    array_record,
+    value_record,
+)
 from memscal.model.film import LINEAR, NEO_HOOKEAN, ElasticFilm, more_and_less
 from memscal.model.measured_stress import MeasuredScan
 from memscal.model.scan import Scan, SetUp
@@ -104,9 +111,7 @@ class PressureShape:
 
 
 @lru_cache(maxsize=32)
-def _three_orders(
-    m: float, nodes: bytes, width: float
-) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _three_orders(m: float, nodes: bytes, width: float) -> ArrayTriple:
     """Return the transforms of the exponents m, m + 1 and m + 2, at the radius a of m."""
     k = np.frombuffer(nodes)
     if math.isinf(m):

@@ -53,7 +53,7 @@ from memscal.mechanics.surface import (
     on_hats,
     singular_integrals,
 )
-from memscal.model.arrays import ArrayPair, FloatArray, array_record, floats, slices
+from memscal.model.arrays import ArrayPair, ArrayTriple, FloatArray, array_record, floats, slices
 from memscal.model.film import ElasticFilm
 
 # exp(-2 * 340) is still a normal number; beyond, every response has long reached its limit.
@@ -68,7 +68,7 @@ def half_space_coupling(nu: float) -> float:
     return -(1 - 2 * nu) / (2 * (1 - nu))
 
 
-def corrections(x: ArrayLike, nu: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+def corrections(x: ArrayLike, nu: float) -> ArrayTriple:
     r"""What the base adds to the half-space, :math:`W - 1, X + (1-2\nu)/2(1-\nu), Y - 1`."""
     # They decay as x^2 exp(-2x).
     x, decay, denominator, kappa = _prepare(x, nu)

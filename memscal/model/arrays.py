@@ -15,6 +15,7 @@ FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.intp]
 BoolArray = NDArray[np.bool_]
 ArrayPair = tuple[FloatArray, FloatArray]
+ArrayTriple = tuple[FloatArray, FloatArray, FloatArray]
 ArrayFunction = Callable[[FloatArray], FloatArray]
 
 Arrays = dict[str, FloatArray]

@@ -21,7 +21,14 @@ from memscal.axisymmetry.hankel import gauss_between
 from memscal.errors import ConvergenceError
 from memscal.extensions.finite_strain.film_elements import FilmElements
 from memscal.mechanics.solver.step import Load, Target, reached
-from memscal.model.arrays import ArrayPair, FloatArray, IndexArray, array_record, value_record
+from memscal.model.arrays import (
+    ArrayPair,
+    ArrayTriple,
+    FloatArray,
+    IndexArray,
+    array_record,
+    value_record,
+)
 
 
 @value_record
@@ -39,7 +46,7 @@ class Face:
         """Radius of the flat part of the end: the contour is straight up to there."""
         return self.radius - self.edge
 
-    def contour(self, s: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def contour(self, s: FloatArray) -> ArrayTriple:
         """Return points, tangents and curvature vectors at ``s`` (mm), shapes (2, n)."""
         angle = np.clip((s - self.flat) / self.edge, 0.0, np.pi / 2)
         sine = np.sin(angle)

@@ -35,7 +35,7 @@ from memscal.mechanics.film_response import RingTraction
 from memscal.mechanics.solver.refinement import RingRequest, relative_change
 from memscal.mechanics.solver.step import Depth, Load, Target
 from memscal.mechanics.surface import anticlockwise, on_hats
-from memscal.model.arrays import ArrayFunction, FloatArray, array_record, value_record
+from memscal.model.arrays import ArrayFunction, ArrayTriple, FloatArray, array_record, value_record
 from memscal.model.field_mesh import FieldMesh
 from memscal.model.film import MOONEY_RIVLIN, NEO_HOOKEAN, ElasticFilm
 from memscal.model.indenter import Rod, Sphere
@@ -314,7 +314,7 @@ class FiniteStrainField:
     pressed: Pressed
 
     @cached_property
-    def tractions(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def tractions(self) -> ArrayTriple:
         """Radii at the base (m), pressure and outward shear on the film there (Pa)."""
         # Of the splines that do the same work as the nodal forces on every displacement that is
         # linear between the corners: more accurate than stresses taken inside the elements, and in
@@ -331,7 +331,7 @@ class FiniteStrainField:
         return np.asarray(r[1:]) / _MM, np.asarray(normal * _MPA), np.asarray(shear * _MPA)
 
     @cached_property
-    def displacements(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def displacements(self) -> ArrayTriple:
         """Radii of the surface's nodes before deformation, their depression and outward shift."""
         elements = self.pressing.elements
         x = self.pressed.x
