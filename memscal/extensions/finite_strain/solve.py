@@ -347,8 +347,7 @@ class FiniteStrainField:
     def spectrum(self, k: FloatArray, order: int) -> FloatArray:
         """Return the transform of normal stress or traction at ``k`` (rad/m), in N."""
         r = self.tractions[0]
-        traction = self.tractions[1 + order]
-        return hankel_transform(r, traction, np.ravel(k), order=order).reshape(np.shape(k))
+        return hankel_transform(r, self.tractions[1 + order], k, order=order)
 
     def surface(self, r: FloatArray, order: int) -> FloatArray:
         """Return depression or outward displacement in m at radii before the deformation."""

@@ -340,7 +340,7 @@ class ElementField:
         nodes = self.system.side(1.0)[0].r * self.film.thickness
         index = np.arange(_PER_NODE * (nodes.size - 1) + 1) / _PER_NODE
         r = np.interp(index, np.arange(nodes.size), nodes)
-        return hankel_transform(r, self.base(r, order), np.ravel(k), order=order).reshape(k.shape)
+        return hankel_transform(r, self.base(r, order), k, order=order)
 
     @cached_property
     def _tractions(self) -> tuple[ArrayFunction, ...]:
@@ -357,9 +357,8 @@ class ElementField:
 
     def base(self, r: FloatArray, order: int) -> FloatArray:
         """Return normal stress or outward traction at the base in Pa."""
-        flat = np.ravel(r)
-        values = self._tractions[order](np.minimum(flat, self.radius) / self.film.thickness)
-        return np.where(flat <= self.radius, values, 0.0).reshape(np.shape(r))
+        values = self._tractions[order](np.minimum(r, self.radius) / self.film.thickness)
+        return np.where(r <= self.radius, values, 0.0)
 
     def surface(self, r: FloatArray, order: int) -> FloatArray:
         """Return depression or outward displacement of the surface in m."""
