@@ -28,7 +28,7 @@ from scipy.special import ive
 from memscal.axisymmetry.hankel import bessel
 from memscal.estimation.forward import ForwardModel
 from memscal.estimation.gaussian import GaussianFit
-from memscal.model.arrays import FloatArray, array_record
+from memscal.model.arrays import FloatArray, IndexArray, array_record
 
 ORDERS = (1, 2, 3, 4)
 #: In units of the Gaussian's width: blur of the rings, their distance, and where the envelope of
@@ -77,13 +77,12 @@ class AngularDepartures:
     """Kernels of unit prior variance: of each order those with a cosine, then those with a sine."""
 
     components: AngularRings
-    #: (q, m) of each cosine and sine of ORDERS: amplitudes of the rings in each kernel, in V/Pa.
-    amplitudes: tuple[FloatArray, ...]
+    amplitudes: FloatArray  # (8 q, count): of the rings in each kernel, in V/Pa
 
     @property
     def count(self) -> int:
         """How many kernels there are."""
-        return sum(amplitudes.shape[1] for amplitudes in self.amplitudes)
+        return int(self.amplitudes.shape[1])
 
     def mean(self, _: Callable[..., FloatArray], place: FloatArray) -> FloatArray:
         """Means of the kernels over directions, or their transforms, at places (n,): none."""
@@ -122,15 +121,11 @@ class AngularDepartures:
 
     def _by_rings(self, coefficients: FloatArray) -> list[FloatArray]:
         """Amplitudes (q, c) of the rings in combinations of the kernels, cosine and sine."""
-        ends = np.cumsum([amplitudes.shape[1] for amplitudes in self.amplitudes])
-        parts = zip(self.amplitudes, np.split(coefficients, ends[:-1]), strict=True)
-        return [amplitudes @ part for amplitudes, part in parts]
+        return np.split(self.amplitudes @ coefficients, 2 * len(ORDERS))
 
     def combined(self, rings: FloatArray) -> FloatArray:
         """Columns (n, count) of the kernels by those of the rings, (n, 8 q)."""
-        blocks = np.split(rings, len(self.amplitudes), axis=1)
-        pairs = zip(blocks, self.amplitudes, strict=True)
-        return np.hstack([block @ each for block, each in pairs])
+        return rings @ self.amplitudes
 
 
 def rings_of_order(m: int, r: FloatArray, radius: FloatArray, blur: float) -> FloatArray:
@@ -145,28 +140,29 @@ def angular_departures(
     """Choose the kernels about a Gaussian fit; ``noise`` is that of a point of weight one."""
     # ``columns``, standardised: data (n,), of the fit's parameters, of all radial departures and
     # of the rings, (n, p).
+    from scipy.linalg import block_diag
+
     data, flat, radial, by_rings = (values / noise for values in columns)
     units = _unit_amplitudes(rings.radius, fit.width)
     # Shifts of all scans along x and y, then the ellipse along x and along the diagonals.
     parameters = [*fit.shifts(flat).T, *flat[:, -2:].T]
-    amplitudes = []
-    voltages = []
+    blocks = []
     for i, block in enumerate(np.split(by_rings, 2 * len(ORDERS), axis=1)):
         kernels = np.diag(fit.size * units[i // 2])
         if i < len(parameters):
             # All combinations that the scan can tell from that parameter.
             alike = parameters[i] @ (block @ kernels)
             kernels = kernels @ np.linalg.svd(alike[None])[2][1:].T
-        amplitudes.append(kernels)
-        voltages.append(block @ kernels)
+        blocks.append(kernels)
+    order = np.repeat(np.arange(len(blocks)) // 2, [kernels.shape[1] for kernels in blocks])
+    amplitudes = block_diag(*blocks)
     left, singular, _ = np.linalg.svd(np.hstack([flat, radial]), full_matrices=False)
     base = left[:, singular > _RESOLVED]
-    free = np.hstack(voltages)
+    free = by_rings @ amplitudes
     free -= base @ (base.T @ free)
     data -= base @ (base.T @ data)
-    strengths = _expected_strengths(free, data, [kernels.shape[1] for kernels in amplitudes])
-    sizes = zip(np.repeat(strengths, 2), amplitudes, strict=True)
-    return AngularDepartures(rings, tuple(strength * kernels for strength, kernels in sizes))
+    strengths = _expected_strengths(free, data, order)
+    return AngularDepartures(rings, amplitudes * strengths[order])
 
 
 def _unit_amplitudes(radius: FloatArray, width: float) -> list[FloatArray]:
@@ -179,12 +175,11 @@ def _unit_amplitudes(radius: FloatArray, width: float) -> list[FloatArray]:
     return [envelope / np.sqrt(np.sum(measure @ each**2)) for each in rings]
 
 
-def _expected_strengths(columns: FloatArray, data: FloatArray, counts: list[int]) -> FloatArray:
+def _expected_strengths(columns: FloatArray, data: FloatArray, order: IndexArray) -> FloatArray:
     """Root mean square of each order's strength over its posterior, given the others'."""
     # With an ellipse orders mix: its shift has one of 1 and one of 3.
     square = columns.T @ columns
     product = columns.T @ data
-    order = np.repeat(np.arange(len(counts)) // 2, counts)
     strengths = np.full(len(ORDERS), _FIRST)
 
     def log_marginal(trial: FloatArray) -> float:

@@ -22,7 +22,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import field
 from functools import cached_property, lru_cache
-from typing import TYPE_CHECKING, ClassVar, TypeAlias
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from scipy.special import ive, j1
@@ -37,8 +37,6 @@ from memscal.model.sizes import too_large
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline
     from scipy.sparse import csr_array
-
-Rows: TypeAlias = slice | BoolArray
 
 #: Above :data:`DENSE` points of lines, no more waves are decomposed: minutes and gigabytes.
 _MOST_WAVES = 1000
@@ -123,7 +121,9 @@ class Geometry:
     _waves: dict[int, FloatArray] = field(default_factory=dict, init=False)  # at the points
     _interpolations: dict[int, csr_array] = field(default_factory=dict, init=False)
 
-    def summed(self, wave: int, spread: FloatArray, rows: Rows = slice(None)) -> FloatArray:
+    def summed(
+        self, wave: int, spread: FloatArray, rows: slice | BoolArray = slice(None)
+    ) -> FloatArray:
         """Sum a wave over the nodes, by factors (nodes,) or (nodes, m), at some of the points."""
         if self.radius.size > DENSE or wave > 1:
             count = self._nodes_of(spread)
@@ -253,12 +253,6 @@ class ForwardModel:
         towards = -offset / np.where(radius > 0, radius, 1.0)
         across = self.reference.order == ACROSS
         return Geometry(radius, towards, self.k, across, self.reach)
-
-    def cosines(self, centres: FloatArray) -> FloatArray:
-        """Cosines between a channel's component and the points, for trial centres (m, 2)."""
-        across = [self.points.x - centres[:, :1], self.points.y - centres[:, 1:]]
-        radius = np.hypot(*across)
-        return across[self.axis] / np.where(radius > 0, radius, 1.0)
 
     def signal(self, geometry: Geometry, kernel: FloatArray) -> FloatArray:
         """Voltages for kernels in V/Pa by their transforms, shape (nodes,) or (nodes, m)."""

@@ -148,7 +148,10 @@ def _robust_start_of_scan(model: ForwardModel, weights: FloatArray) -> FloatArra
     data = root * points.u
     drift = root[:, None] * model.straight_columns
     factors = points.load * root
-    odd = factors * model.cosines(centres) if points.order else factors
+    odd = factors
+    if points.order:
+        along = points.positions[model.axis] - centres[:, model.axis, None]
+        odd = factors * along / np.where(distances > 0, distances, 1.0)
     shapes = np.concatenate([np.interp(distances, radii, table) * odd for table in tables])
     amplitudes, costs = _amplitudes(shapes, data, drift)
     if points.order:

@@ -61,7 +61,7 @@ def free_model(estimate: ProfileEstimate, *, clip_outliers: bool = False) -> Fre
     scaled = fit.jacobian / np.linalg.norm(fit.jacobian, axis=0)
     first = [(u - fit.predicted)[:, None], scaled]
     if basis.angular:
-        first.append(basis.angular.combined(basis.angular.components.signal(model, fit.centre)))
+        first.append(basis.angular.components.signal(model, fit.centre))
     columns, mix = model.framed(fit.geometry, first)
     if mix is None:
         columns = np.hstack([columns, model.signal(fit.geometry, kernels)])
@@ -76,6 +76,8 @@ def free_model(estimate: ProfileEstimate, *, clip_outliers: bool = False) -> Fre
     _, flat, around, rings = np.split(
         columns, [1, 1 + fit.jacobian.shape[1], columns.shape[1] - len(mixed)], axis=1
     )
+    if basis.angular:
+        around = basis.angular.combined(around)
     rings = np.hstack([around, rings @ mixed])
     base = np.linalg.qr(flat)[0]
     left, singular, _ = np.linalg.svd(rings - base @ (base.T @ rings), full_matrices=False)

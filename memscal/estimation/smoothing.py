@@ -144,46 +144,44 @@ def _fitted(
     nodes = reference.wavenumbers
     arrays = (array.tobytes() for array in (nodes.k, nodes.weights, reference.values))
     layout = _layout(reach, points.step, reference.order, reference.source, *arrays)
-    basis, intervals, *matrices = layout
+    basis, intervals, free, penalty, transform = layout
     interval = np.minimum((radius / reach * intervals).astype(np.intp), intervals - 1)
-    spline = _RadialSpline(basis(radius, 0), interval, *matrices)
-    gain, predicted = spline.fit(y, weight)
-    return spline.transform @ gain, predicted
+    splines = basis(radius, 0)
+    gain = _smoothed(splines, interval, free, penalty, y, weight)
+    return transform @ gain, splines @ (free @ (gain @ y))
 
 
-@array_record
-class _RadialSpline:
-    """Even splines on [0, R], continued by the reference's tail."""
+def _smoothed(
+    splines: csr_array,
+    interval: IndexArray,
+    free: FloatArray,
+    penalty: FloatArray,
+    y: FloatArray,
+    weight: FloatArray,
+) -> VoltageMap:
+    """Smooth y (n,) by the restricted likelihood: coefficients of the free splines by y."""
+    # ``splines`` (n, b) at the points, which lie in an ``interval`` each; ``free`` (b, m) of them,
+    # and the triangular root (m, m) of their penalty.
+    from scipy.linalg import solve_triangular
+    from scipy.sparse import eye_array
 
-    points: csr_array  # (n, b): B-splines at the points, of which few differ from zero at each
-    interval: IndexArray  # (n,): the interval between knots that each point lies in
-    free: FloatArray  # (b, m): splines with the slope of the tail at R, by B-splines
-    root: FloatArray  # (m, m): triangular root of the penalty
-    transform: FloatArray  # (k, m): transforms of the splines
-
-    def fit(self, y: FloatArray, weight: FloatArray) -> tuple[VoltageMap, FloatArray]:
-        """Smooth y (n,) by the restricted likelihood: coefficients by y, and what is predicted."""
-        from scipy.linalg import solve_triangular
-        from scipy.sparse import eye_array
-
-        root = np.sqrt(weight)
-        weighted = self.points.multiply(root[:, None]).tocsr()
-        # Between two knots few splines differ from zero: each interval has few rows in R.
-        if root.size > DENSE:
-            cells, reduced = _by_intervals(weighted, self.interval)
-        else:
-            cells = eye_array(root.size, format="csr")
-            reduced = weighted.toarray()
-        design = solve_triangular(self.root, (reduced @ self.free).T, trans="T").T
-        left, values, right = np.linalg.svd(design, full_matrices=False)
-        data = root * y
-        along = left.T @ (cells.T @ data)
-        smoothing = _restricted_likelihood(values, along, float(data @ data), y.size)
-        filters = values / (values**2 + smoothing)
-        # The data, by the rows of the reduced design, to the coefficients.
-        back = solve_triangular(self.root, (right.T * filters) @ left.T)
-        predicted = self.points @ (self.free @ (back @ (left @ along)))
-        return VoltageMap(((back, cells.multiply(root[:, None]).tocsr()),)), predicted
+    root = np.sqrt(weight)
+    weighted = splines.multiply(root[:, None]).tocsr()
+    # Between two knots few splines differ from zero: each interval has few rows in R.
+    if root.size > DENSE:
+        cells, reduced = _by_intervals(weighted, interval)
+    else:
+        cells = eye_array(root.size, format="csr")
+        reduced = weighted.toarray()
+    design = solve_triangular(penalty, (reduced @ free).T, trans="T").T
+    left, values, right = np.linalg.svd(design, full_matrices=False)
+    data = root * y
+    along = left.T @ (cells.T @ data)
+    smoothing = _restricted_likelihood(values, along, float(data @ data), y.size)
+    filters = values / (values**2 + smoothing)
+    # The data, by the rows of the reduced design, to the coefficients.
+    back = solve_triangular(penalty, (right.T * filters) @ left.T)
+    return VoltageMap(((back, cells.multiply(root[:, None]).tocsr()),))
 
 
 def _by_intervals(weighted: csr_array, interval: IndexArray) -> tuple[csr_array, FloatArray]:

@@ -17,7 +17,7 @@ from memscal.estimation.plane import PlaneDepartures, Spots
 from memscal.estimation.points import measured_points
 
 RADII = np.array([0.3e-3, 0.8e-3])
-ONE_EACH = tuple(np.eye(2) for _ in range(2 * len(ORDERS)))
+ONE_EACH = np.eye(4 * len(ORDERS))
 
 
 def test_kernels_are_blurred_rings_of_their_order():
