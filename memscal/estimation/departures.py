@@ -206,16 +206,6 @@ class ReducedScan:
         voltages = self.model.signal(self.fit.geometry, kernels)
         return self.model.points.standardised(voltages, self.weights)
 
-    def summed(self, share: FloatArray) -> FloatArray:
-        """Factors (r,) whose products with reduced columns are sums of shares (n,) of columns."""
-        root = np.sqrt(self.weights)
-        factor = self.model.points.decorrelation
-        shares = share / root if factor is None else factor.correlate_adjoint(share / root)
-        if self.right is None:
-            return shares
-        shares = shares if factor is None else factor.correlate(shares)
-        return self.right.T @ (shares / root)
-
     def by_voltages(self, gain: FloatArray) -> VoltageMap:
         """Derivatives by the voltages (m, n) of numbers with these by the reduced data, (m, r)."""
         if self.right is not None:

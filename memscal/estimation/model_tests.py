@@ -18,7 +18,7 @@ from memscal.estimation.gaussian import fit_gaussian_to_points
 from memscal.estimation.points import FEWEST_AT_CEILING, agreeing_tops
 from memscal.estimation.profile import NUMERICAL_FLOOR, ProfileEstimate
 from memscal.estimation.residuals import FEWEST_RESIDUALS, TestOutcome, ratio_outcome
-from memscal.estimation.voltage_map import evenly, triangular
+from memscal.estimation.voltage_map import evenly, square_root, triangular
 from memscal.model.arrays import TINY, BoolArray, FloatArray, IndexArray, array_record, value_record
 from memscal.model.checks import FALSE_ALARM
 
@@ -112,7 +112,6 @@ class ExtraColumns:
     fall: float  # of chi-square
     count: int  # of columns
     coefficients: FloatArray
-    errors: FloatArray  # standard uncertainties of the coefficients
     size: float  # largest voltage that the columns add, over the largest signal
 
 
@@ -161,15 +160,10 @@ def _add(estimate: ProfileEstimate, columns: FloatArray) -> ExtraColumns:
     root = triangular(points.standardised(np.hstack([gaussian, columns, left]), weights))
     free = root[count:, count:-1]
     residual = root[count:, -1]
-    information = np.linalg.pinv(free.T @ free, hermitian=True)
-    coefficients = information @ (free.T @ residual)
+    coefficients = np.linalg.lstsq(free, residual, rcond=None)[0]
     fall = float(residual @ free @ coefficients)
-    # The adopted noise counts what the columns explain, but it is no less than the stated one.
-    least = estimate.noise_scale**-2 if points.u_errors is not None else 0.0
-    share = max(1 - fall / max(float(residual @ residual), TINY), least)
-    errors = np.sqrt(share * np.diag(information))
     size = float(np.abs(columns @ coefficients).max() / estimate.largest_signal)
-    return ExtraColumns(fall, columns.shape[1], coefficients / scale, errors / scale, size)
+    return ExtraColumns(fall, columns.shape[1], coefficients / scale, size)
 
 
 #: Readings at three places agree by chance so many times better than a fit has them differ once in
@@ -220,12 +214,9 @@ def _agreeing(estimate: ProfileEstimate, inside: BoolArray) -> tuple[BoolArray, 
     closer = np.maximum(_CLOSER ** (2 / (places - 1)), _LEAST_CLOSER)
     least = max(_OF_NOISE * np.median(estimate.noise[inside]), _FLAT * estimate.largest_signal)
     better = (differ > closer * apart) & (differ > least) & (highest > u[0])
-    tops = []
-    for some in (counts, counts[better[counts - 1]]):
-        top = np.zeros_like(inside)
-        top[rows[: some.max(initial=0)]] = True
-        tops.append(top)
-    return tops[0], tops[1]
+    place = np.full(inside.size, inside.size)
+    place[rows] = np.arange(rows.size)
+    return place < counts.max(initial=0), place < counts[better[counts - 1]].max(initial=0)
 
 
 def _risen_above(estimate: ProfileEstimate, plateau: BoolArray) -> bool:
@@ -262,8 +253,8 @@ def _risen_above(estimate: ProfileEstimate, plateau: BoolArray) -> bool:
     # Mean over the plateau of the prediction less the voltage, and its standard uncertainty.
     share = plateau[chosen] / plateau[chosen].sum()
     overshoot = -(share @ weighed.residual)
-    slope = reduced.summed(share) @ basis.columns(reduced)
-    variance = share**2 @ estimate.noise[chosen] ** 2 + slope @ weighed.covariance @ slope
+    spread = share @ basis.voltages(model, fit, square_root(weighed.covariance))
+    variance = share**2 @ estimate.noise[chosen] ** 2 + spread @ spread
     least = max(-ndtri(FALSE_ALARM) * np.sqrt(variance), least_rise * estimate.largest_signal)
     return bool(overshoot > least)
 

@@ -33,11 +33,10 @@ _NOTHING: Mapping[str, Any] = MappingProxyType({})
 
 @dataclass(frozen=True)
 class Kind:
-    """How a quantity that is no number is written (if not empty, or ``always``) and read."""
+    """How a quantity that is no number is written (no empty text) and read."""
 
     write: Callable[[Quantity, Any], Node]
     read: Callable[[SafeFile, str], Any]
-    always: bool = False
     inside: str = ""
 
 
@@ -64,15 +63,11 @@ KINDS = {
     "truth": Kind(
         lambda _, truth: writer.count(truth),
         lambda file, path: bool(file.require_scalar(path, "dimensionless")),
-        always=True,
     ),
-    "mapping": Kind(
-        _write_json_note, lambda file, path: file.json_value(path, dict, {}), True, "/data"
-    ),
+    "mapping": Kind(_write_json_note, lambda file, path: file.json_value(path, dict, {}), "/data"),
     "messages": Kind(
         lambda quantity, messages: _write_json_note(quantity, [*map(asdict, messages)]),
         lambda file, path: messages_from_json(file.json_value(path, list, [])),
-        True,
         "/data",
     ),
     "file": Kind(lambda _, source: write_source(source), read_source),
@@ -88,7 +83,9 @@ def write_record(record: Record, stated: object, **others: Node) -> Group:
         name = quantity.name
         value = stated[name] if isinstance(stated, Mapping) else getattr(stated, name)
         kind = KINDS.get(quantity.dimension)
-        if value is not None and kind is None:
+        if value is None:
+            continue
+        if kind is None:
             for axis, size in zip(quantity.axes, np.shape(value), strict=True):
                 if axis not in keys:
                     children.setdefault(axis, writer.index_axis(axis, size))
@@ -96,7 +93,7 @@ def write_record(record: Record, stated: object, **others: Node) -> Group:
             if quantity.of is not None:
                 value_of = quantity.key.removesuffix("_errors")
                 children.setdefault(value_of, si(quantity.of, quantity.dimension))
-        elif value is not None and kind is not None and (value or kind.always):
+        elif value != "":
             children[quantity.key] = kind.write(quantity, value)
     plot: dict[str, Attribute] = {"signal": record.signal, "axes": record.axes}
     return Group(record.nx_class, children | others, plot if record.signal else {})

@@ -39,8 +39,7 @@ def opened_scans(
     """Return scans that are given themselves or as paths, at least one; of ``most`` points each."""
     listed = listed_items(scans)
     opened = [opened_scan(scan, most, accept_altered=accept_altered) for scan in listed]
-    if len(opened) > 1:
-        require_different(map(contents_of, opened))
+    require_different(map(contents_of, opened))
     return tuple(opened)
 
 
@@ -58,8 +57,7 @@ def opened_contacts(
                 opened.append(stress_from(file) if is_stress else scan_from(file))
         else:
             opened.append(opened_scan(item))
-    if len(opened) > 1:
-        require_different(contents_of(item) for item in opened if isinstance(item, Scan))
+    require_different(contents_of(item) for item in opened if isinstance(item, Scan))
     return tuple(opened)
 
 

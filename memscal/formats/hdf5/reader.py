@@ -141,8 +141,6 @@ class SafeFile:
 
     def has(self, path: str) -> bool:
         """Return whether a path exists; a link that is not a hard link is refused."""
-        if self._listed is None and path in self._opened:
-            return self._opened[path] is not None
         with damage_named(f"{self.where(path)} cannot be opened"):
             return self._open(path) is not None
 
