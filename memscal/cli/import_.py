@@ -228,7 +228,7 @@ _NEEDED_WITH_MESH = ("r_unit", "sigma_unit")
 @option("--u-sign", _SIGN)(
     "Scan: -1 where the voltage falls when the indenter presses.  [default: 1]"
 )
-@option("--ceiling", Quantity("unit of u", low=-float("inf")))(
+@option("--ceiling", Quantity("unit of u"))(
     "Scan: end of amplifier or converter, in the unit of u, after --u-sign: readings at or above "
     "it are left out."
 )

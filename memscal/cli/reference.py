@@ -132,8 +132,8 @@ Examples:
 @option("--profile-table", FILE, metavar="TABLE")(
     "Profile: a delimited table of radius and height, from the axis outward."
 )
-@option("--r-unit", default="mm")("Profile: unit of the radii.")
-@option("--z-unit", default="um")("Profile: unit of the heights.")
+@option("--r-unit", "UNIT")("Profile: unit of the radii.  [default: of the column's head, or mm]")
+@option("--z-unit", "UNIT")("Profile: unit of the heights.  [default: of the head, or um]")
 @option("--friction", NonNegative("ratio", infinite=True), metavar="MU")(
     "Friction coefficient between indenter and film; inf: it sticks wherever it touches.  "
     "[default: 0; inf of a rod on a film that is not linear]"

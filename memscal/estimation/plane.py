@@ -18,6 +18,7 @@ import numpy as np
 from scipy.special import logsumexp
 
 from memscal.axisymmetry.kernels import Rings
+from memscal.estimation.ellipse import bounded
 from memscal.estimation.forward import ForwardModel
 from memscal.estimation.gaussian import GaussianFit
 from memscal.model.arrays import BoolArray, FloatArray, array_record
@@ -105,7 +106,7 @@ class Spots:
 
 def _moments(fit: GaussianFit) -> FloatArray:
     """Second moments of the Gaussian, in m^2."""
-    e1, e2 = fit.ellipticity
+    e1, e2 = bounded(fit.ellipticity)
     return np.asarray(fit.width**2 * np.array([[1 + e1, e2], [e2, 1 - e1]]))
 
 

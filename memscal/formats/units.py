@@ -20,7 +20,19 @@ SI_UNITS = {name: dimension.si for name, dimension in DIMENSIONS.items()}
 """The unit of each dimension inside Python."""
 
 #: Words for readings in a unit of their own.
-ARBITRARY = ("a.u.", "arb", "arb.", "arb. units", "arbitrary", "adu", "ADU", "lsb", "LSB", "digits")
+ARBITRARY = (
+    "a.u.",
+    "a.u",
+    "arb",
+    "arb.",
+    "arb. units",
+    "arbitrary",
+    "adu",
+    "ADU",
+    "lsb",
+    "LSB",
+    "digits",
+)
 # Canonical units of each dimension with the power of ten that takes them to SI; the micro sign and
 # the Greek mu are two characters.
 _POWERS = {
@@ -48,7 +60,11 @@ for _dimension, _units in _POWERS.items():
 
 # What pint may be asked: names, products and small powers.  Arithmetic such as 9**9**9 is a
 # way to hang a program from inside a file.
-_WORD = r"(?:[A-Za-zµμ°%][A-Za-z0-9_µμ°%]*|1)"
+# Units of print and of land are other words in a head: pixels and points of a scan, R of a lock-in.
+_WORD = (
+    r"(?!(?:px|points?|picas?|hands?|li|links?|rods?|chains?|poles?|R|m?U)\b)"
+    r"(?:[A-Za-zµμ°%][A-Za-z0-9_µμ°%]*|1)"
+)
 _FACTOR = rf"{_WORD}(?:\s*(?:\*\*|\^)\s*\(?-?[0-9](?:\.5)?\)?)?"
 _UNIT = re.compile(rf"\s*\(?{_FACTOR}(?:\s*[*/·.]\s*\(?{_FACTOR}\)?|\s+{_FACTOR})*\)?\s*")
 _MAX_LENGTH = 64

@@ -232,8 +232,8 @@ def _timed(
     size = np.diff(starts, append=u.size)
     own = size[dwell]
     time = (np.arange(u.size) - starts[dwell]) / own
-    # Of a row, not of a place: short stops on the way are no places.
-    usual = np.median(own)
+    # Short stops on the way are no places, and long waits at some do not tell what is usual.
+    usual = np.median(size[4 * size > np.median(own)])
     spread = _DEVIATIONS * np.median(np.abs(own - usual))
     alike = np.abs(size - usual) <= max(_FEWEST, _ALIKE * usual, min(spread, usual / 2))
     spans = []

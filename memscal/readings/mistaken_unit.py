@@ -134,7 +134,7 @@ def _depth(film: ElasticFilm, indenter: RoundIndenter, load: float) -> float:
 
 def require_recorded(load: float, recorded: FloatArray) -> None:
     """Refuse a nominal load in N that lies beyond those that were recorded."""
-    if np.isnan(recorded).all():
+    if np.isnan(recorded).all() or not load > 0:  # which a scan refuses
         return
     low = np.nanmin(recorded)
     high = np.nanmax(recorded)

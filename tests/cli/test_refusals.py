@@ -90,6 +90,7 @@ WRONG_USAGE = {
     "$columns --shear-sign -1": "--shear-sign",
     "$columns --sigma s": "--sigma belong to --format reference",
     "$columns --young-modulus 1,75": "Write a decimal point",
+    "$columns --ceiling -1.2": "above 0",
     "$columns --load 1_0": "is not a number",
     "$columns --u x": "--u is given twice",
     "$columns --output b.h5": "given twice",

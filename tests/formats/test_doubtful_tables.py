@@ -31,6 +31,7 @@ CELLS = {
     "WARM": ["err"] + ["21.5"] * 14,
     "COMMA": ["21,5"] * N,
 }
+CELLS["GROUPED"] = [f"{500 * i:,}".replace(",", ".") for i in range(N)]
 CELLS["POINT"] = [count.replace(",", ".") for count in CELLS["COUNT"]]
 CELLS["LOW"] = [x.replace(".", "_") for x in CELLS["X"]]
 CELLS["XC"], CELLS["UC"] = ([c.replace(".", ",") for c in CELLS[name]] for name in "XU")
@@ -72,6 +73,10 @@ LVM = "Channels\t2\t\nX0\t0.0\t0.0\n***End_of_Header***\t\t\nt\tx (mm)\tU (mV)\t
         ("x (mm)\tU (1)~{WHOLE}\t{COUNT}", {}, r"thousands(.|\n)*--decimal ,"),
         ("x (mm)\tU (1)\tV~{WHOLE}\t{COUNT}\t{COUNT}", {}, "thousands"),
         ("x (mm);U (1)~{WHOLE};{POINT}", {}, r"thousands(.|\n)*--decimal \."),
+        ("x (um);U (uV)~{GROUPED};{GROUPED}", {}, r"thousands(.|\n)*--decimal \."),
+        ("x_mm U_mV~{X} {U}", {"u": "U_mV", "u_unit": "V"}, "states the unit 'mV'"),
+        ("x in mm;U: mV~{X};{U}", {"u_unit": "V"}, "states the unit 'mV'"),
+        ("x (px);U (mV)~{X};{U}", {}, "no unit that is known"),
         ("x (mm),U (mV)~{LOW},{U}", {}, "'-7_00'"),
         ("x (mm),U (mV)~1D{N},{U}", {}, "'1D1'"),
         ("no,x (mm),U (mV)~{LABEL},{X},{U}", {}, r"15 \('Mean'\), 16 \('Max'\)"),
@@ -86,7 +91,9 @@ LVM = "Channels\t2\t\nX0\t0.0\t0.0\n***End_of_Header***\t\t\nt\tx (mm)\tU (mV)\t
         ("x,U~{X} mm,{U}mV", {}, "Units stand in its cells"),
         ("x,U~{X},{U}&x,U~{X},{U}&x,U~{X},{U}", NO_UNITS, "stands again in lines 17, 33"),
         ("# rod\n# x,U~{X},{U}&# rod\n# x,U~{X},{U}", NO_UNITS, "again in line 19"),
+        ("# x (mm) U (mV)~{X} {U}&# x (mm) U (uV)~{X} {U}", {}, "again in line 17"),
         ("n,x,U~{ABOVE},{X},{U}", NO_UNITS, r"line 2 \('Mean'\), 3"),
+        ("x (mm),U (mV),F~{X},{U},-1", {"load_column": "F"}, "not above zero"),
         ("# x,U,V~{X},{U},{V}&# U,x,V~{U},{X},{V}", NO_UNITS, "again in line 17"),
     ],
 )
@@ -104,6 +111,7 @@ def test_what_two_readings_of_a_table_could_mean_is_asked(tables, options, words
         ("A title of five words~{X} {U}", BY_NUMBER),
         ("x U~{N} {X} {U}", {**AFTER_INDEX, "skip_rows": 1}),
         ("0,1~{X},{U}", {**BY_NUMBER, "skip_rows": 1}),
+        ("x_mm;U, mV~{X};{U}", {}),
         ("x (mm)\tF\tU (mV)~{X}\t\t{U}", {}),
         ("F\tx (mm)\tU (mV)~\t{X}\t{U}", {}),
         ("n\tF\tx (mm)\tU (mV)~P {N}\t\t{X}\t{U}", {}),

@@ -79,13 +79,17 @@ LARGEST = U.max()
         ({"valid_max": 0.9 * LARGEST}, (), True),
         ({"valid_range": [0.0, 0.9 * LARGEST]}, (), True),
         ({"scale_factor": 1e-3}, (), True),
+        ({"scale": "linear", "offset": [0, 0, 0], "conversion": 1}, (), False),
         ({"add_offset": [2.0]}, (), True),
+        ({"slope": np.float32(1e-3)}, (), True),
+        ({"offset": 2}, (), True),
         ({"_FillValue": np.float32(LARGEST)}, (), True),
         ({"missing_value": [-1.0, LARGEST]}, (), True),
         ({}, ("u_zz_scaling_factor",), True),
         ({}, ("x_offset",), True),
         ({}, ("scaling_factor",), True),
         ({}, ("u_zz_mask",), True),
+        ({}, ("mask",), True),
     ],
 )
 def test_numbers_that_another_statement_changes_are_refused(path, stated, beside, changed):

@@ -350,6 +350,8 @@ def test_nodes_given_twice_are_averaged_and_reported():
     found = reference_table("r,s\n0,2\n1,1.1\n1,0.9\n2,0.1\n", load=7.0)
     assert found.profile.sigma_zz.tolist() == [2e6, 1e6, 0.1e6]
     assert any("1 rows repeat" in note.text and "0.05" in note.text for note in found.notes)
+    steps = reference_table("r,s\n0,2\n1,1\n2,0.1\n0,1\n1,0.5\n2,0.05\n", load=7.0)
+    assert [note.severity for note in steps.notes if "repeat" in note.text] == ["warning"]
 
 
 def test_the_shear_sign_turns_the_stress_component_into_the_traction_on_the_film():
@@ -428,10 +430,14 @@ def test_an_error_of_a_spreadsheet_is_a_cell_and_a_comment_among_rows_is_told():
 def test_a_tip_that_is_lowest_away_from_its_axis_is_warned_of(apex, lowest):
     r = np.arange(0.0, 6.5, 0.5)
     table = Path("tip.csv")
-    table.write_text(rows(*map(np.ndarray.tolist, (r, 5 * (r - apex) ** 2)), header="r,z"))
+    heights = 5e-3 * (r - apex) ** 2
+    table.write_text(rows((1e3 * r).tolist(), heights.tolist(), header="r (um),z_mm"))
     with warnings.catch_warnings(record=True) as seen:
         warnings.simplefilter("always")
-        read_indenter_table(table, r_unit="mm", z_unit="um")
+        profile = read_indenter_table(table)
+    np.testing.assert_allclose(
+        [profile.r[-1], profile.z[-1]], [6e-3, (heights[-1] - heights.min()) * 1e-3]
+    )
     assert [f"lowest height is {lowest:g} mm from" in str(each.message) for each in seen] == [
         True
     ] * (apex > 0)

@@ -90,7 +90,7 @@ def presses(sensor, waits, drift=0.0):
     return columns
 
 
-WAITS = [{}, {0: 500}, {6: 500}, {0: 60, 9: 90}]
+WAITS = [{}, {0: 500}, {6: 500}, {0: 60, 9: 90}, {7: 300, 8: 600, 9: 500, 10: 200}]
 
 
 @pytest.mark.parametrize("waits", WAITS)

@@ -35,10 +35,11 @@ _SCALES = b"DIMENSION_LIST"
 #: What changes the numbers of an array: beside it, and among its attributes, with which of them it
 #: changes; a fill value may have been stored in fewer digits.
 _BESIDE = ("_scaling_factor", "_offset", "_mask")
+_FACTORS = "scale_factor scaling_factor scale slope conversion conversion_factor multiplier"
 _SAME = partial(np.isclose, rtol=1e-6, atol=0)
 _CHANGES: dict[str, Callable[[Any, Any], Any]] = {
-    "scale_factor": lambda _, factor: factor != 1,
-    "add_offset": lambda _, offset: offset != 0,
+    **dict.fromkeys(_FACTORS.split(), lambda _, factor: factor != 1),
+    **dict.fromkeys(("add_offset", "offset", "intercept"), lambda _, offset: offset != 0),
     "_FillValue": _SAME,
     "missing_value": _SAME,
     "valid_min": np.less,
@@ -215,7 +216,7 @@ class SafeFile:
 
     def units_of(self, path: str) -> str | None:
         """Return the unit that stands at a path, or ``None``."""
-        units = self.attribute(path, "units")
+        units = self.attribute(path, "units") or self.attribute(path, "unit")
         if isinstance(units, tuple) and len(units) == 1:
             units = units[0]
         return None if units is None else str(units)
@@ -296,13 +297,15 @@ class SafeFile:
     def _require_plain(self, path: str, values: np.ndarray[Any, Any]) -> None:
         """Refuse numbers that others scale, shift or leave out before they use them."""
         beside = [path + name for name in _BESIDE]
-        beside.append(f"{path.rpartition('/')[0]}/scaling_factor")  # of older NXdata
+        folder = path.rpartition("/")[0]
+        beside += [f"{folder}/scaling_factor", f"{folder}/mask"]  # the first of older NXdata
         changes = [other for other in beside if values.ndim and self._open(other)]
         for name, change in _CHANGES.items():
             if h5py.h5a.exists(self._opened[path], name.encode()):
-                stated = np.array(self.attribute(path, name), float)
-                if np.any(change(values[..., None], stated)):
-                    changes.append(f"{path}@{name}")
+                with suppress(ValueError):  # a word, such as a linear scale
+                    stated = np.array(self.attribute(path, name), float)
+                    if np.any(change(values[..., None], stated)):
+                        changes.append(f"{path}@{name}")
         if changes:
             raise FormatError(
                 f"{self.where(path)} is not as it is meant: {changes[0]} changes its numbers.",

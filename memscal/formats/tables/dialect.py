@@ -16,10 +16,14 @@ NUMBER = re.compile(
 _MEASURED = re.compile(rf"{NUMBER.pattern}\s*([^\d\s].*)")
 _THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}[.,]\d{3}")
 #: A number with a separator of thousands, such as -4.000,0.
-GROUPED = re.compile(r"[+-]?[0-9]{1,3}(?:[.,' ][0-9]{3})+(?:[.,][0-9]+)?")
-#: A name and its unit: x (mm) or x [mm], and x/mm.
-_HEADS = (re.compile(r"(.+?)[\s/]*[(\[]([^()\[\]]+)[)\]]"), re.compile(r"([^/]+?)\s*/(.+)"))
+GROUPED = re.compile(r"[+-]?[1-9][0-9]{0,2}(?:[.,' ][0-9]{3})+(?:[.,][0-9]+)?")
 UNIT = re.compile(r"[fpnuµμmkMG]?(?:V|A|T|Pa|N)|[nuµμmc]?m")
+#: A name and its unit: x (mm) or x [mm], and x/mm; x_mm, x in mm, where the unit is no letter.
+_HEADS = (
+    re.compile(r"(.+?)[\s/]*[(\[]([^()\[\]]+)[)\]]"),
+    re.compile(r"([^/]+?)\s*/(.+)"),
+    re.compile(rf"(.+?)(?:\s+in)?[\s_:,]+(?=..)({UNIT.pattern})"),
+)
 #: A word between blanks; one that is a name has the unit in brackets that follows it.
 _WORD = re.compile(r"[^\W\d]\S*\s+(?:\([^()]*\)|\[[^\[\]]*\])|\S+")
 _REMARK = re.compile(r"comment|remark|note|bemerk|kommentar", re.IGNORECASE)
@@ -163,7 +167,7 @@ def find_decimal(rows: Rows, marks: str = ",.") -> str:
         marked = [cell for cell in column if mark in cell]
         if all(map(_THOUSANDS.fullmatch, marked)):
             doubtful.append(marked[0])
-            mixed |= mark == "," and len(marked) < len(column)
+            mixed |= len(marked) < len(column)
     alone = len(doubtful) == len(shown) < len(columns) and (mark == "," or len(shown) == 1)
     if mixed or alone:
         raise FormatError(

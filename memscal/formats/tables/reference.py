@@ -20,6 +20,8 @@ _WARNED = 0.03
 _REFUSED = 2.0
 # Samples whose stress has not decayed to this share of its maximum end early.
 _DECAYED = 0.01
+# Values at one radius that differ from their mean by this share of the maximum are of two steps.
+_APART = 0.1
 # In SI; a force calculated from larger numbers would overflow.
 _ABSURD = 1e30
 
@@ -130,7 +132,7 @@ def _sorted_by_radius(samples: Samples, notes: list[Message]) -> dict[str, Any]:
         f"(normal stresses differ from the mean by up to {apart / peak if peak else 0:.2g} "
         "of the maximum)."
     )
-    notes += import_notes([text])
+    notes.append(Message("import", text, "warning" if apart > _APART * peak else "note"))
     return means
 
 

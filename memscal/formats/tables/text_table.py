@@ -196,7 +196,8 @@ class TextTable(NamedColumns):
         """Leave out comments among the rows, and look for a head in them."""
         self._comments += [number for number, _ in comments]
         heads = self._commented_heads(comments, {self._columns}) if self._headed else []
-        self._again.update(number for number, cells in heads if {*cells} <= {*self.names})
+        names = {self._cut(name)[0] for name in self.names}
+        self._again.update(n for n, row in heads if {self._cut(c)[0] for c in row} <= names)
 
     def _describe(self, count: int) -> None:
         self._refuse_more_names()
@@ -422,10 +423,15 @@ def _line_end(text: bytes) -> int:
     return 0
 
 
-def read_indenter_table(path: FilePath, *, r_unit: str, z_unit: str) -> Profile:
+def read_indenter_table(
+    path: FilePath, *, r_unit: str | None = None, z_unit: str | None = None
+) -> Profile:
     """Read an indenter's profile from a table with one row per radius: radius and height."""
     table = TextTable(path, skip_rows=0)
-    units = {1: r_unit, 2: z_unit}
+    units = {
+        1: table.unit_of(1, r_unit, "r_unit (--r-unit)", "mm"),
+        2: table.unit_of(2, z_unit, "z_unit (--z-unit)", "um"),
+    }
     columns = table.columns({str(i): Wanted(i, unit, "length") for i, unit in units.items()})
     name = os.path.basename(os.fspath(path))
     with placed(name):

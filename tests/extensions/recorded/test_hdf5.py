@@ -11,8 +11,8 @@ from memscal import import_table
 X = np.linspace(-6.0, 6.0, 13)
 HELD = {
     "x": (X, "mm"),
-    "u": (X**2, ["mV"]),
-    "t": (10**18 + 10**8 * np.arange(13), "ns"),
+    "u": (X**2, "mV"),
+    "t": (10**18 + 10**8 * np.arange(13), ["ns"]),
     "N": (X, "N"),
     "bare": (X, ""),
     "plane": (np.eye(13), "mm"),
@@ -40,7 +40,7 @@ def path(folder):
         data.attrs.update(NX_class="NXdata", signal="u", axes=["x"])
         for name, (values, unit) in HELD.items():
             data[name] = values
-            data[name].attrs["units"] = unit
+            data[name].attrs["unit" if name == "u" else "units"] = unit
         data["soft"] = h5py.SoftLink("/data/x")
         data.create_dataset("endless", (2**44,), "f8", chunks=(2**10,))
     return folder / "run.nxs"
