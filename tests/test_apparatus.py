@@ -14,9 +14,9 @@ from scipy.integrate import dblquad
 from scipy.stats import ncx2, norm
 
 import memscal
+from memscal import ApparatusField, ApparatusRadial, ParameterSet, TransferFunction
 from memscal.axisymmetry.kernels import unit_gaussian
 from memscal.errors import InputError
-from memscal.model.apparatus import ApparatusField, ApparatusRadial, ParameterSet, TransferFunction
 
 SUPPORT = 6e-3
 DRAWS = 40 if FULL else 12

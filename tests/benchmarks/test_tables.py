@@ -3,8 +3,7 @@
 import numpy as np
 from helpers.machine import show, turns
 
-from memscal.formats.scan import read_scan, write_scan
-from memscal.formats.tables.scan import import_table
+from memscal import import_table, read_scan, write_scan
 
 
 def table(folder, rows):

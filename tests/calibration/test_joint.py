@@ -23,8 +23,8 @@ from helpers.scans import (
 )
 
 import memscal
+from memscal import StressSensor
 from memscal.errors import InputError
-from memscal.model.scan import StressSensor
 
 SEEDS = 60 if FULL else 12
 LOW, HIGH = root_mean_square_range(SEEDS, 1e-5)

@@ -7,8 +7,8 @@ import pytest
 from helpers.scans import simulate
 
 import memscal
+from memscal import read_scan, write_scan
 from memscal.errors import InputError
-from memscal.formats.scan import read_scan, write_scan
 
 pytestmark = pytest.mark.usefixtures("folder")
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from memscal.axisymmetry.grids import EvenGrid, Lattice
+from memscal import EvenGrid, Lattice
 from memscal.axisymmetry.kernels import unit_gaussian
 from memscal.deconvolution.division import DivisionProblem
 from memscal.model.arrays import FloatArray

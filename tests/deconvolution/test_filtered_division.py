@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.special import expm1
 
-from memscal.axisymmetry.grids import EvenGrid, Lattice
+from memscal import EvenGrid, Lattice
 from memscal.deconvolution.division import (
     DivisionProblem,
     Tikhonov,

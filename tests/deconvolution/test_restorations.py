@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from memscal.axisymmetry.grids import Lattice
+from memscal import Lattice
 from memscal.axisymmetry.kernels import unit_gaussian
 from memscal.deconvolution.division import (
     DivisionProblem,

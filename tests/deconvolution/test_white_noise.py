@@ -5,7 +5,7 @@ import pytest
 from helpers.bounds import RARE, root_mean_square_range
 from scipy.stats import gamma
 
-from memscal.axisymmetry.grids import EvenGrid, Lattice
+from memscal import EvenGrid, Lattice
 from memscal.axisymmetry.kernels import unit_gaussian
 from memscal.deconvolution.division import (
     DivisionProblem,

@@ -12,10 +12,10 @@ from helpers.scans import CENTRE, CONVERSION, as_points, estimated, simulated
 from scipy.stats import binom, chi2
 
 import memscal
+from memscal import Scan
 from memscal.estimation.model_tests import axisymmetry_test, linearity_test, symmetry_test
 from memscal.estimation.runs import hysteresis_test
 from memscal.model.checks import chi_square_limit
-from memscal.model.scan import Scan
 
 BOTH = {"repeats": 2, "points": 33, "branch": ["approach", "retreat"]}
 

@@ -7,9 +7,9 @@ import pytest
 from helpers.scans import RING, TAILS, added_ring, estimated, simulated
 
 import memscal
+from memscal import divide
 from memscal.calibration.fields import LineFields, choose_grid
 from memscal.deconvolution.division import WhiteNoise
-from memscal.deconvolution.fourier_ratio import divide
 from memscal.estimation.band import find_band
 from memscal.estimation.smoothing import smooth_profile
 

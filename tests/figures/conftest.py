@@ -7,8 +7,8 @@ import pytest
 from helpers.scans import simulate
 
 import memscal
+from memscal import Message
 from memscal.figures.calibration import calibration_figure
-from memscal.model.checks import Message
 
 
 @cache

@@ -11,9 +11,9 @@ from matplotlib.collections import PolyCollection, QuadMesh
 from scipy.interpolate import CubicSpline
 
 import memscal
+from memscal import StressSensor
 from memscal.figures.calibration import calibration_figure
 from memscal.figures.style import panels_of
-from memscal.model.scan import StressSensor
 
 NOISY = {"noise": 0.05}
 

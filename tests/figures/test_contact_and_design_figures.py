@@ -5,10 +5,10 @@ import pytest
 from helpers.paper import FILM, SPHERE
 
 import memscal
+from memscal import indent
 from memscal.errors import InputError
 from memscal.extensions.planning.figure import design_figure
 from memscal.figures.stress import contact_figure
-from memscal.mechanics.indent import indent
 
 
 def curve(axes, color, style):

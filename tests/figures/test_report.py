@@ -6,8 +6,8 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
+from memscal import StressSensor
 from memscal.figures import report, style
-from memscal.model.scan import StressSensor
 
 _VOID = {"meta", "img", "br", "link", "hr"}
 _HOSTILE = "<script>alert('x')</script>\"&$title ${body} --><img src=x onerror=1>"

@@ -8,13 +8,11 @@ import pytest
 from helpers.builders import make_artifact, make_film, make_profile, make_scan
 from helpers.digests import rewrite_digest
 
-from memscal.apparatus import load_apparatus
+from memscal import load_apparatus, read_reference, read_scan, write_reference, write_scan
 from memscal.errors import FormatError, SchemaVersionError
 from memscal.formats.artifact import write_artifact
 from memscal.formats.hdf5.writer import SCHEMA_VERSION
 from memscal.formats.inspection import check
-from memscal.formats.reference import read_reference, write_reference
-from memscal.formats.scan import read_scan, write_scan
 
 
 @pytest.fixture

@@ -14,10 +14,10 @@ import pytest
 from helpers.bounds import FULL
 from helpers.builders import make_scan
 
+from memscal import read_scan, write_scan
 from memscal.errors import FormatError, InputError, UnsafeFileError
 from memscal.formats.hdf5 import limits
 from memscal.formats.hdf5.writer import DIGEST_ATTRIBUTE
-from memscal.formats.scan import read_scan, write_scan
 
 SIGNAL = "/entry/data/u_zz"
 SWEEP = """

@@ -8,12 +8,10 @@ import numpy as np
 import pytest
 from helpers.builders import make_artifact, make_profile, make_scan
 
-from memscal.apparatus import load_apparatus
+from memscal import load_apparatus, write_reference, write_scan
 from memscal.errors import FormatError, InputError
 from memscal.formats.artifact import write_artifact
 from memscal.formats.inspection import check, describe
-from memscal.formats.reference import write_reference
-from memscal.formats.scan import write_scan
 from memscal.model.provenance import timestamp
 
 

@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 from helpers.builders import make_scan
 
+from memscal import read_scan, write_scan
 from memscal.errors import InputError
 from memscal.formats.inspection import check
-from memscal.formats.scan import read_scan, write_scan
 
 SIDE = np.linspace(-4e-3, 4e-3, 9)
 U = np.exp(-((SIDE - 1e-3) ** 2 + (SIDE[:, None] + 2e-3) ** 2) / 8e-6)

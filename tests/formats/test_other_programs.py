@@ -8,9 +8,8 @@ import xarray
 from helpers.builders import BARE, make_artifact, make_profile, make_scan
 from nexusformat.nexus.validate import validate_file
 
+from memscal import write_reference, write_scan
 from memscal.formats.artifact import write_artifact
-from memscal.formats.reference import write_reference
-from memscal.formats.scan import write_scan
 
 WRITERS = {
     "line": lambda path: write_scan(make_scan("line"), path),

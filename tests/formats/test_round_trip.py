@@ -13,17 +13,21 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from memscal.apparatus import load_apparatus
+from memscal import (
+    FieldMesh,
+    ParameterSet,
+    SourceFile,
+    Sphere,
+    load_apparatus,
+    read_reference,
+    read_scan,
+    write_reference,
+    write_scan,
+)
 from memscal.errors import FormatError, InputError, OutputError, UnitError
 from memscal.extensions.meshes.mesh_files import write_mesh
 from memscal.formats.artifact import write_artifact
-from memscal.formats.reference import read_reference, write_reference
-from memscal.formats.scan import read_scan, write_scan
-from memscal.model.apparatus import ParameterSet
 from memscal.model.checks import Message, QualityCheck, messages_from_json
-from memscal.model.field_mesh import FieldMesh
-from memscal.model.indenter import Sphere
-from memscal.model.provenance import SourceFile
 
 
 def kept(**fields):

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from PIL import Image
 
 import memscal
+from memscal import import_table
 from memscal.calibration import calibrate as calibration
 from memscal.calibration import prepare
 from memscal.errors import InputError
@@ -20,7 +21,6 @@ from memscal.estimation import points
 from memscal.formats.hdf5.reader import SafeFile
 from memscal.formats.tables import columns, text_table
 from memscal.formats.tables.columns import Wanted
-from memscal.formats.tables.scan import import_table
 from memscal.formats.tables.text_table import TextTable
 from memscal.friction import compare as compare_module
 from memscal.model.scan import BRANCHES

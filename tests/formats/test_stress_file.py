@@ -12,16 +12,23 @@ from helpers.folders import DATA
 from helpers.scans import known_apparatus
 
 import memscal
-from memscal import MeasuredPoints, MeasuredProfile, MeasuredScan, MeasuredStress
+from memscal import (
+    Equipment,
+    LoadCell,
+    MeasuredPoints,
+    MeasuredProfile,
+    MeasuredScan,
+    MeasuredStress,
+    Process,
+    QualityCheck,
+    SourceFile,
+    Sphere,
+    StressSensor,
+)
 from memscal.errors import FormatError, InputError
 from memscal.formats.hdf5 import limits
 from memscal.formats.inspection import check
 from memscal.formats.stress import read_stress, write_stress
-from memscal.model.checks import QualityCheck
-from memscal.model.indenter import Sphere
-from memscal.model.instrument import Equipment
-from memscal.model.provenance import Process, SourceFile
-from memscal.model.scan import LoadCell, StressSensor
 
 SCANS = tuple(
     MeasuredScan(

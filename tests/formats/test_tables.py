@@ -10,14 +10,11 @@ import pytest
 from helpers.builders import make_film
 from helpers.tables import imported
 
+from memscal import Rod, Scan, Sphere, TableLayout, import_table
 from memscal.errors import FormatError, InputError, UnitWarning
 from memscal.formats.tables.reference import read_reference_table
-from memscal.formats.tables.scan import import_table
-from memscal.formats.tables.stated import TableLayout
 from memscal.formats.tables.text_table import read_indenter_table
 from memscal.model.checks import marked_texts
-from memscal.model.indenter import Rod, Sphere
-from memscal.model.scan import Scan
 
 
 def scan_table(text, **options):

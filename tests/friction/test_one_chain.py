@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import memscal
+from memscal import Equipment
 from memscal.friction.calculated import amontons_family
 from memscal.friction.likelihood import points_of, predict, sensor_of
-from memscal.model.instrument import Equipment
 
 LOAD = 2.75
 SHARE = 0.01

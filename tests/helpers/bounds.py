@@ -9,7 +9,7 @@ from helpers.scans import CENTRE, CONVERSION, EXACT_FILM, GAUSSIAN, simulated
 from scipy.stats import chi2
 
 import memscal
-from memscal.model.apparatus import ParameterSet
+from memscal import ParameterSet
 from memscal.model.arrays import FloatArray
 
 FULL = bool(os.environ.get("MEMSCAL_FULL_STUDY"))

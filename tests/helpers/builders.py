@@ -5,9 +5,19 @@ from dataclasses import replace
 import numpy as np
 
 import memscal
-from memscal import ElasticFilm, Process, Rod, Scan, SourceFile, StressProfile, StressSensor
+from memscal import (
+    ElasticFilm,
+    Message,
+    Process,
+    QualityCheck,
+    Rod,
+    Scan,
+    SourceFile,
+    StressProfile,
+    StressSensor,
+    Sweep,
+)
 from memscal.axisymmetry.kernels import unit_gaussian
-from memscal.extensions.monte_carlo.sweep import Sweep
 from memscal.model.apparatus import (
     ApparatusData,
     ApparatusField,
@@ -15,7 +25,6 @@ from memscal.model.apparatus import (
     ParameterSet,
     Reconvolution,
 )
-from memscal.model.checks import Message, QualityCheck
 
 SIGMA = 561e-6
 CONVERSION = 3.0e-8

@@ -18,9 +18,9 @@ from helpers.scans import plane_error
 from scipy.special import j0
 
 import memscal
+from memscal import Scan
 from memscal.axisymmetry.hankel import Wavenumbers, radial_spline
 from memscal.model.arrays import FloatArray
-from memscal.model.scan import Scan
 
 RADII = np.linspace(0.0, 3e-3, 121)
 """Where every peer gives G, in m."""

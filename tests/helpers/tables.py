@@ -2,8 +2,7 @@
 
 from dataclasses import fields
 
-from memscal.formats.tables.scan import ImportedScan, import_table
-from memscal.formats.tables.stated import ScanConditions, ScanUncertainties, TableLayout
+from memscal import ImportedScan, ScanConditions, ScanUncertainties, TableLayout, import_table
 
 RECORDS = {
     "layout": TableLayout,

@@ -13,10 +13,10 @@ from helpers.outside import scan as rod_scan
 from helpers.outside_sphere import LOAD, LOADS, SPHERE, Pressed, contacts
 
 import memscal
+from memscal import BoundedEstimate
 from memscal.friction.calculated import amontons_family
 from memscal.friction.compare import compare_measured
 from memscal.friction.family import ProfileFamily
-from memscal.friction.results import BoundedEstimate
 
 FRICTION = 0.1
 GAIN = 0.005

@@ -8,9 +8,8 @@ from helpers.paper import FILM, SPHERE
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
-from memscal import ElasticFilm, Rod, indent
+from memscal import ElasticFilm, ExponentialCompliance, GreenwoodTripp, Interface, Rod, indent
 from memscal.errors import InputError
-from memscal.mechanics.interface import ExponentialCompliance, GreenwoodTripp, Interface
 
 ROUGHNESS = 1.82e-6
 GREENWOOD_TRIPP = GreenwoodTripp(roughness=ROUGHNESS, asperity_density=5e9, asperity_radius=20e-6)

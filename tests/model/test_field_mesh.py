@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from memscal import FieldMesh
 from memscal.errors import InputError
-from memscal.model.field_mesh import FieldMesh
 
 
 def parts(**changes):

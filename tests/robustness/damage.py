@@ -11,7 +11,7 @@ import numpy as np
 from helpers.digests import rewrite_digest
 from hypothesis import strategies as st
 
-from memscal.errors import MemscalError
+from memscal import MemscalError
 from memscal.formats.hdf5.writer import CONTENTS_PATH, DIGEST_ATTRIBUTE
 
 NUMBERS = (

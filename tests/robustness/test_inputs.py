@@ -29,11 +29,10 @@ from robustness.damage import (
 )
 
 import memscal
+from memscal import write_reference, write_scan
 from memscal.cli import main
 from memscal.errors import UnitWarning
 from memscal.formats.artifact import write_artifact
-from memscal.formats.reference import write_reference
-from memscal.formats.scan import write_scan
 
 #: Documented exit codes: done, a check failed, usage, input refused, output not written.
 CODES = {0, 1, 2, 3, 4}

@@ -17,10 +17,9 @@ from helpers.console import names, run_program
 from helpers.scans import simulate
 from robustness.campaign import SHARE, count, number
 
-from memscal.errors import MemscalError
+from memscal import MemscalError, write_scan
 from memscal.formats.artifact import write_artifact
 from memscal.formats.inspection import check, describe
-from memscal.formats.scan import write_scan
 
 CALIBRATE = "calibrate scan.h5 -o out.h5 --figure out.png --report out.html"
 #: Three files that nothing is drawn for.

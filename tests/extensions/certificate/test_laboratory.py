@@ -6,8 +6,8 @@ import pytest
 from helpers.folders import SHIPPED
 
 import memscal
+from memscal import MemscalError
 from memscal.cli import main
-from memscal.errors import MemscalError
 from memscal.extensions.certificate.laboratory import Measured, read_laboratory
 
 pytestmark = pytest.mark.usefixtures("folder")

@@ -4,11 +4,11 @@ import re
 from dataclasses import replace
 from html import unescape
 
+from memscal import QualityCheck
 from memscal.extensions.certificate.certificate import certify
 from memscal.extensions.certificate.dcc import certificate_xml
 from memscal.extensions.certificate.page import certificate_page
 from memscal.model.assumptions import MOVED, NAMES, Assumption
-from memscal.model.checks import QualityCheck
 
 NO_ACCREDITATION = "This is no accredited certificate"
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
+from memscal import BayesFactor
 from memscal.extensions.interface_laws.model_comparison import LawCurve, one_of_all
 from memscal.friction.marginal_likelihood import (
     Statistics,
@@ -12,7 +13,6 @@ from memscal.friction.marginal_likelihood import (
     log_likelihood,
     log_uniform_prior,
 )
-from memscal.model.bayes_factor import BayesFactor
 
 LOG_2PI = float(np.log(2 * np.pi))
 

@@ -10,11 +10,11 @@ import pytest
 from helpers.folders import DATA
 from helpers.meshes import HEIGHTS, RADII, block, pressure, section, tensor, write
 
+from memscal import ElasticFilm
 from memscal.errors import FormatError, InputError, UnitError
 from memscal.extensions.meshes.mesh_files import read_mesh
 from memscal.extensions.meshes.reference_mesh import read_reference_mesh
 from memscal.mechanics.film_response import base_stress
-from memscal.model.film import ElasticFilm
 
 pytestmark = pytest.mark.usefixtures("at_once", "folder")
 

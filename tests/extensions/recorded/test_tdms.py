@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from nptdms import ChannelObject, TdmsWriter
 
-from memscal import import_table
-from memscal.errors import MemscalError
+from memscal import MemscalError, import_table
 
 X = np.arange(13)
 SCALE = {
