@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from helpers.scans import simulate, with_outlier
+from scipy.linalg import toeplitz
 
 import memscal
 from memscal.calibration import field_uncertainty
@@ -18,16 +19,16 @@ RASTER = simulate(noise=0.005, seed=1, raster=True, points=9)
 
 
 def correlated(scan):
-    apart = np.abs(np.subtract.outer(np.arange(scan.x.size), np.arange(scan.x.size)))
+    near = toeplitz(0.3 ** np.arange(scan.x.size))
     noise = np.full(scan.u_zz.shape, 0.005 * np.ptp(scan.u_zz))
-    return replace(scan, u_zz_correlation=0.3**apart, u_zz_errors=noise)
+    return replace(scan, u_zz_correlation=near, u_zz_errors=noise)
 
 
 def correlated_with_neighbours(scan, width):
     """The same noise, stated for neighbours alone; its correlation ends after ``width`` points."""
     x = scan.x.size
-    apart = np.abs(np.subtract.outer(np.arange(x), np.arange(x)))
-    whole = np.where(apart < width, 0.3**apart, 0.0)
+    apart = np.arange(x)
+    whole = toeplitz(np.where(apart < width, 0.3**apart, 0.0))
     columns = [np.append(np.diag(whole, j), np.zeros(j)) for j in range(width)]
     peak = np.nanmax(scan.u_zz)
     scan = replace(scan, u_zz_errors=np.full(scan.u_zz.shape, 0.005 * peak))

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from helpers.scans import simulated, with_outlier
+from scipy.linalg import toeplitz
 
 from memscal.errors import InputError
 from memscal.estimation.points import measured_points, scans_by_load
@@ -59,18 +60,18 @@ def test_a_negative_outlier_is_no_wrong_sign():
 @pytest.mark.parametrize("anew", [False, True])
 def test_repeats_share_the_error_of_their_position(anew, correlation):
     scan = simulated(repeats=3, points=9)
-    apart = np.abs(np.subtract.outer(np.arange(9), np.arange(9)))
+    near = toeplitz(correlation ** np.arange(9))
     scan = replace(
         scan,
         x_errors=np.full(9, 10e-6),
         position_errors_by_repeat=anew,
-        u_zz_correlation=correlation**apart if correlation else None,
+        u_zz_correlation=near if correlation else None,
     )
     points = measured_points(scan)
     moved = np.tile(np.linspace(-2.0, 2.0, 9), 3) * points.u_errors
     stated = 1 / (points.u_errors**2 + moved**2)
     shared = points.sharing_positions(moved, stated)
-    of_repeat = np.kron(np.eye(3), correlation**apart)
+    of_repeat = np.kron(np.eye(3), near)
     together = np.eye(27) if anew else np.tile(np.eye(9), (3, 3))
     covariance = np.outer(points.u_errors, points.u_errors) * of_repeat
     if not (anew and correlation):

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
+from scipy.linalg import toeplitz
 
 from memscal.axisymmetry.hankel import Wavenumbers
 from memscal.friction.effective import FrictionFit, fit_friction
@@ -52,7 +53,6 @@ def gaussian_sensor() -> Sensor:
 def bare_points(*, correlation=0.0, repeats=1) -> LoadPoints:
     """Points of a load whose voltages are still to be drawn."""
     x = np.tile(_POSITIONS, repeats)
-    apart = np.abs(np.subtract.outer(np.arange(x.size), np.arange(x.size)))
     return LoadPoints(
         u=np.zeros(x.size),
         offset=x,
@@ -62,7 +62,7 @@ def bare_points(*, correlation=0.0, repeats=1) -> LoadPoints:
         x_errors=np.full(x.size, 10e-6),
         flat=np.stack([np.ones(x.size), x / x.max()], axis=1),
         load_share=0.01,
-        correlation=correlation**apart if correlation else None,
+        correlation=toeplitz(correlation ** np.arange(x.size)) if correlation else None,
         places=np.tile(np.eye(_POSITIONS.size), (repeats, 1)) if repeats > 1 else None,
     )
 

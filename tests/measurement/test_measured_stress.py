@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from helpers import scans as made
 from helpers.bounds import FULL, root_mean_square_range
+from scipy.linalg import toeplitz
 
 import memscal
 from memscal import SourceFile, StressSensor
@@ -144,7 +145,7 @@ def test_contacts_at_single_points_give_what_rows_give():
 def test_correlated_noise_is_averaged_with_its_correlation():
     exact = {"load_scatter": 0.0, "load_reading": 0.0, "record_loads": False}
     scan = made.contact_scan(6, repeats=2, load=ENDS, **exact)
-    near = 0.4 ** np.abs(np.subtract.outer(np.arange(scan.x.size), np.arange(scan.x.size)))
+    near = toeplitz(0.4 ** np.arange(scan.x.size))
     scan = replace(scan, x_errors=None, u_zz_correlation=near)
     for profile in memscal.measure_stress(scan, SENSOR).profiles:
         points = profile.points["zz"]

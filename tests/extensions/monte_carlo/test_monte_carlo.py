@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from helpers.bounds import FULL
 from helpers.scans import EXACT_FILM, EXACT_ROD, LINEAR_FILM, TAILS, shear_scan, simulated
+from scipy.linalg import toeplitz
 
 import memscal
 from memscal.calibration.uncertainty import BUDGETED
@@ -41,8 +42,8 @@ def forty(paper):
 
 
 def correlated(scan):
-    apart = np.abs(np.subtract.outer(np.arange(scan.x.size), np.arange(scan.x.size)))
-    return replace(scan, u_zz_correlation=0.4**apart, x_errors=np.full(scan.x.size, 2e-5))
+    near = toeplitz(0.4 ** np.arange(scan.x.size))
+    return replace(scan, u_zz_correlation=near, x_errors=np.full(scan.x.size, 2e-5))
 
 
 def incomplete(scan):
