@@ -112,6 +112,7 @@ def test_what_two_readings_of_a_table_could_mean_is_asked(tables, options, words
         ("x U~{N} {X} {U}", {**AFTER_INDEX, "skip_rows": 1}),
         ("0,1~{X},{U}", {**BY_NUMBER, "skip_rows": 1}),
         ("x_mm;U, mV~{X};{U}", {}),
+        ("x (mm);U (mV);T~{X};{U};21\n;;21.125", {}),
         ("x (mm)\tF\tU (mV)~{X}\t\t{U}", {}),
         ("F\tx (mm)\tU (mV)~\t{X}\t{U}", {}),
         ("n\tF\tx (mm)\tU (mV)~P {N}\t\t{X}\t{U}", {}),

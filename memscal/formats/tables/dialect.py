@@ -167,7 +167,9 @@ def find_decimal(rows: Rows, marks: str = ",.") -> str:
         marked = [cell for cell in column if mark in cell]
         if all(map(_THOUSANDS.fullmatch, marked)):
             doubtful.append(marked[0])
-            mixed |= len(marked) < len(column)
+            # Of points some of 100 to 999 tell it, too: 1 and 1.125 are often written so.
+            bare = {*column}.difference(marked)
+            mixed |= any(mark == "," or len(cell.strip("+-")) == 3 for cell in bare)
     alone = len(doubtful) == len(shown) < len(columns) and (mark == "," or len(shown) == 1)
     if mixed or alone:
         raise FormatError(
