@@ -254,11 +254,11 @@ def hat_transform(ring_bytes: bytes, k_bytes: bytes, order: int) -> FloatArray:
     # Gauss nodes between the rings, enough for the largest wavenumber in the widest gap.
     count = 4 + math.ceil(0.7 * (k.max() * widths.max()))
     s, weights = gauss_between(rings, count)
-    rising = ((s.reshape(widths.size, count) - rings[:-1, None]) / widths[:, None]).ravel()
     waves = bessel(order, np.multiply.outer(k, s)) * (weights * s)
-    starts = np.arange(0, s.size, count)
-    right = np.add.reduceat(waves * rising, starts, axis=1)
-    return on_hats(np.add.reduceat(waves, starts, axis=1) - right, right)
+    waves = waves.reshape(k.size, widths.size, count)
+    rising, _ = gauss_panels(1.0, 1.0, count)
+    right = waves @ rising
+    return on_hats(waves.sum(axis=2) - right, right)
 
 
 @array_record

@@ -167,10 +167,6 @@ def average_over_circles(places: FloatArray, columns: Arrays) -> tuple[Arrays, s
 
 # VTK's order of a symmetric tensor, and that of axisymmetric elements in FEM programs.
 _SYMMETRIC = ("xx", "yy", "zz", "xy", "yz", "xz")
-_SCALAR = 1
-_AXISYMMETRIC = 4
-_SIX = 6
-_NINE = 9
 _MOST_LISTED = 30
 #: Share of the largest normal stress that a shear may have and be zero.
 _ZERO = 1e-3
@@ -204,7 +200,7 @@ def _find(mesh: Mesh, frame: Frame, field: str, axis: int) -> Component:
         return Component(name, name in at_points, int(number) - 1, f"component {number}")
     if field not in counts:
         raise _no_such_field(mesh, field, at_points, in_cells)
-    if counts[field] == _SCALAR:
+    if counts[field] == 1:
         return Component(field, field in at_points, 0, "the value")
     column, meaning = _tensor_component(mesh, frame, field, counts[field], axis)
     return Component(field, field in at_points, column, meaning, counts[field])
@@ -215,18 +211,18 @@ def _tensor_component(
 ) -> tuple[int, str]:
     """Return the column of a tensor's component along an axis, and what it is called."""
     axes = "".join(sorted(AXES[axis] + AXES[frame.vertical]))
-    if count == _NINE:
+    if count == 9:
         return 3 * axis + frame.vertical, f"the component {axes}"
-    if count == _SIX and mesh.tensor_order:
+    if count == 6 and mesh.tensor_order:
         return _SYMMETRIC.index(axes), f"the component {axes} (of {', '.join(_SYMMETRIC)})"
-    if count == _AXISYMMETRIC and len(frame.radial) == 1 and not _is_plane(mesh, field):
+    if count == 4 and len(frame.radial) == 1 and not _is_plane(mesh, field):
         number = 2 if axis == frame.vertical else 4
         return number - 1, f"component {number} of 4 (radial, vertical, hoop, shear)"
     raise InputError(
         f"The field {field!r} in {mesh.source.file_name} has {count} components, and which of "
         "them is meant is not plain.",
         why="In an XDMF file the order of a tensor's six components depends on the program."
-        if count == _SIX
+        if count == 6
         else "A stress is one value, or a tensor of 4 components (radial, vertical, hoop and shear "
         "in a section), 6 or 9.",
         cure=f'Name one, counted from 1, such as "{field}:2".',
@@ -313,7 +309,7 @@ def read_reference_mesh(
         _component_note(normal, "Normal stress", treatment),
     ]
     if tangential is not None:
-        if tangential.tensor == _SIX:
+        if tangential.tensor == 6:
             _require_order(mesh, frame, footing, tangential, _ZERO * np.abs(values).max())
         turned = footing.outward if shear_sign is None else shear_sign
         values = _at_base(mesh, frame, footing, tangential)[1]

@@ -208,10 +208,6 @@ _TAILS = ((1 - _COVERAGE) / 2, (1 + _COVERAGE) / 2)
 #: Shares of u by which the standard uncertainties may differ, and by which the mean may be off.
 _TOLERANCE = 0.1
 _LARGEST_SHIFT = 0.25
-_NOT_LINEAR = (
-    "The draws scatter by {:.2f} u, and their mean is {:+.2f} u off. The calibration is not linear "
-    "in the noise or an input over its uncertainty."
-)
 
 
 @array_record
@@ -421,7 +417,13 @@ def _compared(
     error = spread * float(np.sqrt(max(kurtosis - 1, 0.0) / (4 * column.size)))
     # Beyond what the number of draws allows: two standard errors.
     same_mean = abs(mean - expected) <= _LARGEST_SHIFT * u + 2 * spread / np.sqrt(column.size)
-    agrees = abs(spread - u) <= _TOLERANCE * u + 2 * error and same_mean
+    reason = ""
+    if not (same_mean and abs(spread - u) <= _TOLERANCE * u + 2 * error):
+        reason = (
+            f"The draws scatter by {spread / u:.2f} u, and their mean is "
+            f"{(mean - expected) / u:+.2f} u off. The calibration is not "
+            "linear in the noise or an input over its uncertainty."
+        )
     return BudgetComparison(
         name=name,
         value=parameters[name],
@@ -433,7 +435,7 @@ def _compared(
         shortest=tuple(shortest_interval(column).tolist()),
         first_order=u,
         stated=parameters.uncertainty(name),
-        reason="" if agrees else _NOT_LINEAR.format(spread / u, (mean - expected) / u),
+        reason=reason,
     )
 
 
