@@ -316,10 +316,10 @@ def _sphere(folder: Path, options: Options, as_json: bool, force: bool) -> None:
     _require_writable_folder(folder, overwrite=force)
     radius = {name: options[f"sphere_{name}"] for name in ("radius", "radius_uncertainty")}
     sphere: Any = indenter_from("sphere", radius)
-    settings = _settings(simulate_experiment, options)
-    settings["loads"] = options["loads"] or _LOADS
-    settings["points"] = options["contacts"]
     with working("Simulating"):
+        settings = _settings(simulate_experiment, options)
+        settings["loads"] = options["loads"] or _LOADS
+        settings["points"] = options["contacts"]
         made = simulate_experiment(
             **settings,
             sphere=sphere,
