@@ -131,7 +131,7 @@ class RadialSpectrum:
         """Transform over the plane, (ky, kx); zero beyond the last node."""
         nodes = self.wavenumbers.k
         k = np.hypot.outer(ky, kx)
-        return np.where(k <= nodes[-1], radial_spline(nodes, self.values)(k), 0.0)
+        return up_to(nodes[-1], radial_spline(nodes, self.values), k)
 
 
 def radial_spline(r: FloatArray, f: FloatArray, *, order: int = 0) -> ArrayFunction:
@@ -139,6 +139,11 @@ def radial_spline(r: FloatArray, f: FloatArray, *, order: int = 0) -> ArrayFunct
     from scipy.interpolate import CubicSpline
 
     return CubicSpline(*_mirrored(r, f, order))
+
+
+def up_to(end: float, function: ArrayFunction, r: FloatArray) -> FloatArray:
+    """Return a function's values at ``r``, zero beyond an end."""
+    return np.where(r <= end, function(np.minimum(r, end)), 0.0)
 
 
 def _mirrored(r: FloatArray, f: FloatArray, order: int) -> ArrayPair:

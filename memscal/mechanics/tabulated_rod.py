@@ -15,7 +15,7 @@ from typing import Any, NoReturn
 
 import numpy as np
 
-from memscal.axisymmetry.hankel import Wavenumbers
+from memscal.axisymmetry.hankel import Wavenumbers, up_to
 from memscal.errors import InputError
 from memscal.mechanics.contact import Contact
 from memscal.model.arrays import ArrayPair, Arrays, FloatArray, array_record
@@ -45,7 +45,7 @@ class TabulatedField:
         # Even in k, or odd.
         ends: Any = ((2, 0.0) if order else (1, 0.0), "not-a-knot")
         spline = CubicSpline(self.k, self.transforms[order], bc_type=ends)
-        return np.where(k <= self.k[-1], spline(np.minimum(k, self.k[-1])), 0.0)
+        return up_to(self.k[-1], spline, k)
 
     def base(self, r: FloatArray, order: int) -> FloatArray:
         """Return normal stress or outward traction at the base in Pa."""

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from memscal.axisymmetry.hankel import gauss_between, hankel_transform, radial_spline
+from memscal.axisymmetry.hankel import gauss_between, hankel_transform, radial_spline, up_to
 from memscal.errors import ConvergenceError, DomainError
 from memscal.extensions.finite_strain.film_elements import (
     FilmElements,
@@ -35,7 +35,7 @@ from memscal.mechanics.film_response import RingTraction
 from memscal.mechanics.solver.refinement import RingRequest, relative_change
 from memscal.mechanics.solver.step import Depth, Load, Target
 from memscal.mechanics.surface import anticlockwise, on_hats
-from memscal.model.arrays import ArrayFunction, ArrayTriple, FloatArray, array_record, value_record
+from memscal.model.arrays import ArrayTriple, FloatArray, array_record, value_record
 from memscal.model.field_mesh import FieldMesh
 from memscal.model.film import MOONEY_RIVLIN, NEO_HOOKEAN, ElasticFilm
 from memscal.model.indenter import Rod, Sphere
@@ -342,7 +342,7 @@ class FiniteStrainField:
         """Return normal stress or outward traction at the base in Pa."""
         nodes = self.tractions[0]
         spline = radial_spline(nodes, self.tractions[1 + order], order=order)
-        return _within(nodes[-1], spline, r)
+        return up_to(nodes[-1], spline, r)
 
     def spectrum(self, k: FloatArray, order: int) -> FloatArray:
         """Return the transform of normal stress or traction at ``k`` (rad/m), in N."""
@@ -355,7 +355,7 @@ class FiniteStrainField:
 
         nodes = self.displacements[0]
         # Without overshoot.
-        return _within(nodes[-1], PchipInterpolator(nodes, self.displacements[1 + order]), r)
+        return up_to(nodes[-1], PchipInterpolator(nodes, self.displacements[1 + order]), r)
 
     def mesh(self) -> FieldMesh:
         """Return displacement and Cauchy stress on the undeformed mesh."""
@@ -424,8 +424,3 @@ def _spline_masses(r: FloatArray, order: int) -> FloatArray:
     corner = np.arange(r.size)
     hats = np.maximum(0.0, 1 - np.abs(np.interp(nodes, r, corner) - corner[:, None]))
     return _without_axis(hats @ (splines * (2 * np.pi * nodes * weights)[:, None]))
-
-
-def _within(end: float, spline: ArrayFunction, r: FloatArray) -> FloatArray:
-    """Return a spline's values at ``r``, zero beyond its end."""
-    return np.where(r <= end, spline(np.minimum(r, end)), 0.0)

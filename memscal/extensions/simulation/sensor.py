@@ -131,7 +131,7 @@ def simulated_scan(
         **normal,
         channels=tangential,
         load=load,
-        load_uncertainty=None if uncertainty is None else uncertainty * load,
+        load_uncertainty=uncertainty and uncertainty * load,
         sensor=StressSensor(name="a simulated sensor"),
         notes="Synthetic data made by memscal simulate; nothing here was measured.",
         synthetic={

@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 from scipy.sparse import block_array, csc_array, csr_array
 
-from memscal.axisymmetry.hankel import gauss_between, hankel_transform
+from memscal.axisymmetry.hankel import gauss_between, hankel_transform, up_to
 from memscal.errors import DomainError
 from memscal.mechanics.elements.mesh import TriangleMesh, film_triangles
 from memscal.mechanics.surface import SurfaceCompliance, anticlockwise
@@ -357,8 +357,8 @@ class ElementField:
 
     def base(self, r: FloatArray, order: int) -> FloatArray:
         """Return normal stress or outward traction at the base in Pa."""
-        values = self._tractions[order](np.minimum(r, self.radius) / self.film.thickness)
-        return np.where(r <= self.radius, values, 0.0)
+        h = self.film.thickness
+        return up_to(self.radius / h, self._tractions[order], r / h)
 
     def surface(self, r: FloatArray, order: int) -> FloatArray:
         """Return depression or outward displacement of the surface in m."""
