@@ -168,9 +168,10 @@ def mesh_below_a_rod(
         distance = np.hypot(away, thickness - z).min(axis=0)
         # A triangle that is cut has sides up to sqrt(2) of the size that is asked for.
         long = longest > np.sqrt(2) * (finest + slope * distance)
-        if not np.any(long & (longest < 3 * side)):
+        cut = np.flatnonzero(long & (longest < 3 * side))
+        if not cut.size:
             return mesh
-        mesh = mesh.refined(np.flatnonzero(long & (longest < 3 * side)))
+        mesh = mesh.refined(cut)
 
 
 def mesh_below_a_sphere(size: FilmSize, *, contact: float) -> Any:

@@ -419,8 +419,9 @@ def _without_axis(rows: FloatArray) -> FloatArray:
 
 def _spline_masses(r: FloatArray, order: int) -> FloatArray:
     """Return integrals around the axis of hats times splines that are 1 at one corner off it."""
+    from scipy.interpolate import BSpline
+
     nodes, weights = gauss_between(r, order=6)
     splines = radial_spline(r[1:], np.eye(r.size - 1), order=order)(nodes)
-    corner = np.arange(r.size)
-    hats = np.maximum(0.0, 1 - np.abs(np.interp(nodes, r, corner) - corner[:, None]))
-    return _without_axis(hats @ (splines * (2 * np.pi * nodes * weights)[:, None]))
+    hats = BSpline.design_matrix(nodes, np.pad(r, 1, mode="edge"), 1)
+    return _without_axis(hats.T @ (splines * (2 * np.pi * nodes * weights)[:, None]))
