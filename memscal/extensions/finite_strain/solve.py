@@ -424,4 +424,5 @@ def _spline_masses(r: FloatArray, order: int) -> FloatArray:
     nodes, weights = gauss_between(r, order=6)
     splines = radial_spline(r[1:], np.eye(r.size - 1), order=order)(nodes)
     hats = BSpline.design_matrix(nodes, np.pad(r, 1, mode="edge"), 1)
-    return _without_axis(hats.T @ (splines * (2 * np.pi * nodes * weights)[:, None]))
+    masses = hats.T @ (splines * (2 * np.pi * nodes * weights)[:, None])
+    return _without_axis(np.asarray(masses))
