@@ -81,7 +81,6 @@ LARGEST = U.max()
         ({"scale_factor": 1e-3}, (), True),
         ({"scale": "linear", "offset": [0, 0, 0], "conversion": 1}, (), False),
         ({"add_offset": [2.0]}, (), True),
-        ({"slope": np.float32(1e-3)}, (), True),
         ({"offset": 2}, (), True),
         ({"_FillValue": np.float32(LARGEST)}, (), True),
         ({"missing_value": [-1.0, LARGEST]}, (), True),

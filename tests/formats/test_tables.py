@@ -431,7 +431,7 @@ def test_a_tip_that_is_lowest_away_from_its_axis_is_warned_of(apex, lowest):
     table.write_text(rows((1e3 * r).tolist(), heights.tolist(), header="r (um),z_mm"))
     with warnings.catch_warnings(record=True) as seen:
         warnings.simplefilter("always")
-        profile = read_indenter_table(table)
+        profile = read_indenter_table(table, r_unit=None, z_unit=None)
     np.testing.assert_allclose(
         [profile.r[-1], profile.z[-1]], [6e-3, (heights[-1] - heights.min()) * 1e-3]
     )

@@ -35,6 +35,7 @@ _SCALES = b"DIMENSION_LIST"
 #: What changes the numbers of an array: beside it, and among its attributes, with which of them it
 #: changes; a fill value may have been stored in fewer digits.
 _BESIDE = ("_scaling_factor", "_offset", "_mask")
+_OF_ALL = ("scaling_factor", "mask")  # the first of older NXdata
 _FACTORS = "scale_factor scaling_factor scale slope conversion conversion_factor multiplier"
 _SAME = partial(np.isclose, rtol=1e-6, atol=0)
 _CHANGES: dict[str, Callable[[Any, Any], Any]] = {
@@ -297,8 +298,7 @@ class SafeFile:
     def _require_plain(self, path: str, values: np.ndarray[Any, Any]) -> None:
         """Refuse numbers that others scale, shift or leave out before they use them."""
         beside = [path + name for name in _BESIDE]
-        folder = path.rpartition("/")[0]
-        beside += [f"{folder}/scaling_factor", f"{folder}/mask"]  # the first of older NXdata
+        beside += [f"{path.rpartition('/')[0]}/{name}" for name in _OF_ALL]
         changes = [other for other in beside if values.ndim and self._open(other)]
         for name, change in _CHANGES.items():
             if h5py.h5a.exists(self._opened[path], name.encode()):

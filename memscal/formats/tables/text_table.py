@@ -423,16 +423,13 @@ def _line_end(text: bytes) -> int:
     return 0
 
 
-def read_indenter_table(
-    path: FilePath, *, r_unit: str | None = None, z_unit: str | None = None
-) -> Profile:
+def read_indenter_table(path: FilePath, *, r_unit: str | None, z_unit: str | None) -> Profile:
     """Read an indenter's profile from a table with one row per radius: radius and height."""
     table = TextTable(path, skip_rows=0)
-    units = {
-        1: table.unit_of(1, r_unit, "r_unit (--r-unit)", "mm"),
-        2: table.unit_of(2, z_unit, "z_unit (--z-unit)", "um"),
-    }
-    columns = table.columns({str(i): Wanted(i, unit, "length") for i, unit in units.items()})
+    r_unit = table.unit_of(1, r_unit, "r_unit (--r-unit)", "mm")
+    z_unit = table.unit_of(2, z_unit, "z_unit (--z-unit)", "um")
+    wanted = {"1": Wanted(1, r_unit, "length"), "2": Wanted(2, z_unit, "length")}
+    columns = table.columns(wanted)
     name = os.path.basename(os.fspath(path))
     with placed(name):
         # What a microscope calls zero is anywhere.
