@@ -76,10 +76,8 @@ def _solved(root: FloatArray, values: FloatArray, *, transposed: bool) -> FloatA
     below = len(root) - 1
     if not transposed:
         return solve_banded((below, 0), root, values)
-    upper = np.zeros_like(root)
-    for i, diagonal in enumerate(root):
-        upper[below - i, i:] = diagonal[: diagonal.size - i]
-    return solve_banded((0, below), upper, values)
+    upper = np.stack([np.roll(diagonal, i) for i, diagonal in enumerate(root)])
+    return solve_banded((0, below), upper[::-1], values)
 
 
 def _product(root: FloatArray, values: FloatArray, *, transposed: bool) -> FloatArray:

@@ -210,7 +210,7 @@ class ForwardModel:
         column = np.zeros_like(self.points.u)
         for scan in range(self.points.scans):
             inside = self.points.scan == scan
-            for position in (self.points.x[inside], self.points.y[inside]):
+            for position in self.points.positions[:, inside]:
                 half = np.ptp(position) / 2
                 if half > 0:
                     column[inside] += ((position - position.min() - half) / half) ** 2
@@ -224,7 +224,7 @@ class ForwardModel:
             inside = self.points.scan == scan
             columns.append(inside.astype(np.float64))
             for axis in np.flatnonzero(free):
-                position = (self.points.x, self.points.y)[axis]
+                position = self.points.positions[axis]
                 measured = position[inside]
                 middle = (measured.max() + measured.min()) / 2
                 drift = (position - middle) / (np.ptp(measured) / 2)

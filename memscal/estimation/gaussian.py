@@ -184,7 +184,7 @@ def _trial_centres(model: ForwardModel) -> FloatArray:
     points = model.points
     along = [np.zeros(1), np.zeros(1)]
     for axis in np.flatnonzero(points.free[0]):
-        unique = np.unique((points.x, points.y)[axis])
+        unique = np.unique(points.positions[axis])
         margin = unique.size // 10
         central = unique[margin : unique.size - margin]
         if points.missing:  # at a ceiling, those at the centre

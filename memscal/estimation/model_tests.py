@@ -57,7 +57,7 @@ def hold_out(estimate: ProfileEstimate, group: IndexArray) -> HeldOut | None:
     nuisances = slice(2, estimate.points.centres.stop + straight)
     count = int(group.max()) + 1
     # Of too many groups, neighbouring ones are joined.
-    fold = (group if count <= _MOST_FOLDS else group * _MOST_FOLDS // count)[model.point]
+    fold = (group * min(count, _MOST_FOLDS) // count)[model.point]
     # The triangular factors of each fold's design and data stand for them.
     both = np.column_stack([model.design, model.data])
     roots = {int(i): triangular(both[fold == i]) for i in np.unique(fold)}

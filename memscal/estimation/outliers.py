@@ -119,7 +119,7 @@ def isolated(points: ScanPoints, residual: FloatArray) -> FloatArray:
     alone = np.zeros_like(residual)
     for scan in range(points.scans):
         rows = np.flatnonzero(points.scan == scan)
-        places = np.stack([points.x[rows], points.y[rows]], axis=1)
+        places = points.positions[:, rows].T
         count = min(_NEIGHBOURS + 1, rows.size)
         nearest = np.asarray(KDTree(places).query(places, k=count)[1])[:, 1:]
         whole = residual[rows]

@@ -403,7 +403,7 @@ def _require_determined(estimate: ProfileEstimate) -> None:
     for scan, axis in np.argwhere(points.free):
         name = "xy"[axis]
         centre = estimate.centres[scan, axis]
-        positions = (points.x, points.y)[axis][points.scan == scan]
+        positions = points.positions[axis, points.scan == scan]
         if not positions.min() - points.step <= centre <= positions.max() + points.step:
             raise CentreError(
                 f"The sensor's centre would lie at {name} = {centre * 1e3:.4g} mm, outside the "

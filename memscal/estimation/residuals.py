@@ -10,6 +10,7 @@ and every combination of departures that stands above a share of the noise.  Wha
 from __future__ import annotations
 
 import math
+from functools import cached_property
 
 import numpy as np
 from scipy.special import chdtrc, chdtri, fdtrc, fdtri, gammaincc, gammainccinv
@@ -38,6 +39,16 @@ class FreeModel:
     design: FloatArray  # (m, r): weighted columns of the flat parameters, then of the departures
     point: IndexArray  # (m,): which points of the scan they are
     stated: bool  # whether the noise is stated
+
+    @cached_property
+    def basis(self) -> FloatArray:
+        """Orthonormal basis (m, q) of the design."""
+        return orthonormal(self.design)
+
+    @cached_property
+    def left_over(self) -> FloatArray:
+        """What the design leaves of the data, (m,)."""
+        return self.data - self.basis @ (self.basis.T @ self.data)
 
 
 def free_model(estimate: ProfileEstimate, *, clip_outliers: bool = False) -> FreeModel:
@@ -141,11 +152,10 @@ def residuals_of(estimate: ProfileEstimate, model: FreeModel | None = None) -> R
     sequence = grouped(across, points.repeat, points.scan)
     order = np.argsort(place[model.point])
     point = model.point[order]
-    basis = orthonormal(model.design[order])
-    data = model.data[order]
-    left_over = data - basis @ (basis.T @ data)
+    basis = model.basis[order]
+    values = model.left_over[order]
     degrees = basis.shape[0] - basis.shape[1]
-    return Residuals(left_over, basis, point, place[point], sequence[point], model.stated, degrees)
+    return Residuals(values, basis, point, place[point], sequence[point], model.stated, degrees)
 
 
 def chi_square_test(residuals: Residuals) -> TestOutcome:
@@ -172,9 +182,7 @@ def pure_error_test(estimate: ProfileEstimate, model: FreeModel) -> TestOutcome 
         sums = np.stack([np.bincount(group, weight * c) for c in columns.T], axis=1)
         return columns - weight[:, None] * (sums / square[:, None])[group]
 
-    basis = orthonormal(model.design)
-    left_over = model.data - basis @ (basis.T @ model.data)
-    moved = within(basis)
+    moved = within(model.basis)
     _, singular, right = np.linalg.svd(triangular(moved), full_matrices=False)
     apart = singular > _APART
     near = moved @ (right[apart].T / singular[apart])
@@ -182,8 +190,8 @@ def pure_error_test(estimate: ProfileEstimate, model: FreeModel) -> TestOutcome 
     scatter -= near @ (near.T @ scatter)
     pure = float(scatter @ scatter)
     pure_degrees = group.size - int(group.max()) - 1 - near.shape[1]
-    misfit = max(float(left_over @ left_over) - pure, 0.0)
-    degrees = group.size - basis.shape[1] - pure_degrees
+    misfit = max(float(model.left_over @ model.left_over) - pure, 0.0)
+    degrees = group.size - model.basis.shape[1] - pure_degrees
     if degrees < FEWEST_RESIDUALS or pure_degrees < FEWEST_RESIDUALS or pure == 0.0:
         return None
     return ratio_outcome(misfit / degrees / (pure / pure_degrees), degrees, pure_degrees)
