@@ -194,6 +194,14 @@ class ForwardModel:
         return self.reference.wavenumbers.k
 
     @cached_property
+    def alike(self) -> list[list[int]]:
+        """Numbers of the scans, of equal references together."""
+        scans: dict[bytes, list[int]] = {}
+        for scan, reference in enumerate(self.references):
+            scans.setdefault(reference.values.tobytes(), []).append(scan)
+        return [*scans.values()]
+
+    @cached_property
     def drift_columns(self) -> FloatArray:
         """Baseline and drift along each scan, then curvatures of baselines that may be curved."""
         return np.hstack([self.straight_columns, self.curvature_columns])
@@ -269,9 +277,6 @@ class ForwardModel:
         # there are not more points than columns.
         if self.points.u.size <= DENSE or not self.sums_waves:
             return np.hstack(first), None
-        alike: dict[bytes, list[int]] = {}
-        for scan, measure in enumerate(self._measures):
-            alike.setdefault(measure.tobytes(), []).append(scan)
         strongest = np.abs(self._measures).max(axis=0)
         reach = _REACHES * geometry.radius.max() / geometry.reach
         table = (self.points.order, geometry.across, geometry.reach, self.k.tobytes())
@@ -281,10 +286,10 @@ class ForwardModel:
         if self.points.order:
             factor = -factor * geometry.towards[self.axis]
         start = sum(columns.shape[1] for columns in first)
-        columns = np.zeros((factor.size, start + size.size * len(alike)))
+        columns = np.zeros((factor.size, start + size.size * len(self.alike)))
         mixes = []
         np.concatenate(first, axis=1, out=columns[:, :start])
-        for scans in alike.values():
+        for scans in self.alike:
             place = slice(start, start + size.size)
             own_factor = np.where(np.isin(self.points.scan, scans), factor, 0.0)
             for block in slices(factor.size, BLOCK):

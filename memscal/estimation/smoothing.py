@@ -87,14 +87,11 @@ def smooth_profile(estimate: ProfileEstimate) -> SmoothedProfile:
     """Smooth the voltages of scans about their centres; of several references, put together."""
     points = estimate.points
     references = estimate.model.references
-    alike: dict[bytes, list[int]] = {}
-    for scan, reference in enumerate(references):
-        alike.setdefault(reference.values.tobytes(), []).append(scan)
     # Less the background and what of sensor and reference is not round.
     signal = points.u - estimate.background - estimate.oval - estimate.uneven
     predicted = np.zeros(points.u.size)
     gains = []
-    for scans in alike.values():
+    for scans in estimate.model.alike:
         reference = references[scans[0]]
         rows = np.flatnonzero(np.isin(points.scan, scans))
         load = points.load[rows]
