@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.special import chdtrc, chdtri, fdtrc, fdtri, gammaincc, gammainccinv
@@ -20,6 +21,9 @@ from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.voltage_map import DENSE, orthonormalised, triangular
 from memscal.model.arrays import TINY, FloatArray, IndexArray, array_record, slices, value_record
 from memscal.model.checks import FALSE_ALARM, OUTLIER_WEIGHT
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
 
 #: A departure of the expected size that moves no voltage by this share of its noise is left out.
 _SHARE_OF_NOISE = 0.1
@@ -256,6 +260,8 @@ def neighbour_correlation_test(residuals: Residuals) -> TestOutcome:
     # 1950, with more lags).  Normal noise of nu degrees gives it the mean S1/nu and the central
     # moments 2 S2 / nu(nu+2) and 8 S3 / nu(nu+2)(nu+4), where S1 = tr (1 - QQ')W and
     # Sp = tr [(1 - QQ')(W - S1/nu)]^p; the p-value is that of a gamma distribution (Pearson III).
+    from scipy.sparse import diags_array
+
     nu = residuals.degrees
     values = residuals.values
     place = residuals.place
@@ -265,7 +271,9 @@ def neighbour_correlation_test(residuals: Residuals) -> TestOutcome:
     for i in range(1, min(_FARTHEST, place.size - 1) + 1):
         weights = 0.5 * _DECAY ** (place[i:] - place[:-i])
         neighbours.append(weights * (sequence[i:] == sequence[:-i]))
-    first, second, third = _traces(neighbours, residuals.basis)
+    upper = diags_array(neighbours, offsets=range(1, len(neighbours) + 1)).tocsr()
+    pairs = upper + upper.T
+    first, second, third = _traces(pairs, residuals.basis)
     mean = first / nu
     third += 2 * nu * mean**3 - 3 * mean * second
     second -= nu * mean**2
@@ -274,36 +282,23 @@ def neighbour_correlation_test(residuals: Residuals) -> TestOutcome:
     deviation = np.sqrt(2 * second / (nu * (nu + 2)))
     skewness = max(8 * third / (nu * (nu + 2) * (nu + 4)) / deviation**3, _LEAST_SKEWNESS)
     shape = 4 / skewness**2
-    value = float(values @ _weighted(neighbours, values) / (values @ values)) - mean
+    value = float(values @ (pairs @ values) / (values @ values)) - mean
     limit = deviation * (gammainccinv(shape, FALSE_ALARM) - shape) / np.sqrt(shape)
     p_value = gammaincc(shape, max(shape + np.sqrt(shape) * value / deviation, 0.0))
     return TestOutcome(value, float(limit), float(p_value))
 
 
-def _weighted(pairs: list[FloatArray], values: FloatArray) -> FloatArray:
-    """Product of the symmetric matrix of the pairs with rows (n,) or (m, n)."""
-    total = np.zeros_like(values)
-    for i, weights in enumerate(pairs, start=1):
-        total[..., :-i] += weights * values[..., i:]
-        total[..., i:] += weights * values[..., :-i]
-    return total
-
-
-def _traces(pairs: list[FloatArray], basis: FloatArray) -> tuple[float, float, float]:
-    """Traces of the first three powers of (1 - QQ') W, for a W without diagonal."""
-    squared = 2 * sum(weights @ weights for weights in pairs)
-    cubed = 0.0
-    for i, first in enumerate(pairs, start=1):
-        for j, second in enumerate(pairs[: len(pairs) - i], start=1):
-            both = pairs[i + j - 1]
-            cubed += 6 * np.sum(first[: both.size] * second[i : i + both.size] * both)
+def _traces(pairs: csr_array, basis: FloatArray) -> tuple[float, float, float]:
+    """Traces of the first three powers of (1 - QQ') W, for a symmetric W without diagonal."""
+    squared = pairs.multiply(pairs).sum()
+    cubed = (pairs @ pairs).multiply(pairs).sum()
     # Q'WQ, Q'W^2 Q and Q'W^3 Q, some columns at a time.
     products = np.zeros((3, basis.shape[1], basis.shape[1]))
     for some in slices(basis.shape[1], _COLUMNS):
-        moved = np.ascontiguousarray(basis[:, some].T)
+        moved = basis[:, some]
         for product in products:
-            moved = _weighted(pairs, moved)
-            product[some] = moved @ basis
+            moved = pairs @ moved
+            product[some] = moved.T @ basis
     first, second, third = products
     squared += np.sum(first * first.T) - 2 * np.trace(second)
     cubed += 3 * np.sum(first * second) - 3 * np.trace(third) - np.trace(first @ first @ first)
