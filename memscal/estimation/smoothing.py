@@ -183,29 +183,21 @@ def _smoothed(
 
 def _by_intervals(weighted: csr_array, interval: IndexArray) -> tuple[csr_array, FloatArray]:
     """QR decomposition of B-splines at points, interval by interval: Q (n, r) and R (r, b)."""
-    from scipy.sparse import csr_array
+    from scipy.sparse import block_diag, csr_array
 
     order = np.argsort(interval, kind="stable")
-    ends = np.flatnonzero(np.diff(interval[order], append=-1)) + 1
+    starts = np.flatnonzero(np.diff(interval[order])) + 1
+    factors = []
     roots = []
-    parts = []
-    width = 0
-    first = 0
-    for end in ends.tolist():
-        rows = order[first:end]
+    for rows in np.split(order, starts):
         block = weighted[rows]
         columns = np.unique(block.indices)
         q, r = np.linalg.qr(block[:, columns].toarray())
         whole = np.zeros((len(r), weighted.shape[1]))
         whole[:, columns] = r
+        factors.append(q)
         roots.append(whole)
-        places = np.broadcast_to(width + np.arange(len(r)), q.shape)
-        parts.append((q.ravel(), np.repeat(rows, len(r)), places.ravel()))
-        width = width + len(r)
-        first = end
-    data, where, places = map(np.concatenate, zip(*parts, strict=True))
-    orthonormal = csr_array((data, (where, places)), shape=(interval.size, width))
-    return orthonormal, np.vstack(roots)
+    return csr_array(block_diag(factors, format="csr"))[np.argsort(order)], np.vstack(roots)
 
 
 def _restricted_likelihood(values: FloatArray, data: FloatArray, total: float, count: int) -> float:
