@@ -82,13 +82,9 @@ def _solved(root: FloatArray, values: FloatArray, *, transposed: bool) -> FloatA
 
 def _product(root: FloatArray, values: FloatArray, *, transposed: bool) -> FloatArray:
     """L times columns, or L' times them."""
-    if not is_banded(root):
-        return (root.T if transposed else root) @ values
-    total = np.zeros_like(values)
-    count = len(values)
-    for i, diagonal in enumerate(root):
-        above = slice(0, count - i)
-        below = slice(i, count)
-        to, of = (above, below) if transposed else (below, above)
-        total[to] += (diagonal[above] * values[of].T).T
-    return total
+    from scipy.sparse import dia_array
+
+    lower: Any = root
+    if is_banded(root):
+        lower = dia_array((root, -np.arange(len(root))), shape=(len(values), len(values)))
+    return np.asarray((lower.T if transposed else lower) @ values)
