@@ -72,9 +72,10 @@ def corrections(x: ArrayLike, nu: float) -> ArrayTriple:
     r"""What the base adds to the half-space, :math:`W - 1, X + (1-2\nu)/2(1-\nu), Y - 1`."""
     # They decay as x^2 exp(-2x).
     x, decay, denominator, kappa = _prepare(x, nu)
-    normal = -decay * (2 * kappa * decay + 4 * x + 4 * x**2 + kappa**2 + 1) / denominator
+    both = 2 * kappa * decay + 4 * x**2 + kappa**2 + 1
+    normal = -decay * (both + 4 * x) / denominator
     coupling = 2 * decay * (2 * x**2 + 4 * (1 - 2 * nu) * (1 - nu)) / denominator
-    radial = -decay * (2 * kappa * decay - 4 * x + 4 * x**2 + kappa**2 + 1) / denominator
+    radial = -decay * (both - 4 * x) / denominator
     return normal, coupling, radial
 
 

@@ -89,12 +89,9 @@ def _limits(exact: FloatArray, draws: FloatArray) -> tuple[float, float]:
     """Return axis limits from the exact results and the bulk of the draws."""
     known = exact[np.isfinite(exact)]
     drawn = draws[np.isfinite(draws)]
-    shown = known
-    for row in draws:
-        finite = row[np.isfinite(row)]
-        if finite.size:
-            # A bulk that reaches far beyond the exact results is a tail as well.
-            shown = np.concatenate([shown, np.quantile(finite, _SHOWN)])
+    rows = draws[np.any(np.isfinite(draws), axis=1)]
+    # A bulk that reaches far beyond the exact results is a tail as well.
+    shown = np.append(known, np.nanquantile(rows, _SHOWN, axis=1))
     if not shown.size:
         return 0.0, 1.0
     # The axis reaches no farther from the centre than some times the typical spread.

@@ -221,9 +221,8 @@ def simulate_experiment(
     if shear is not None:
         truth["conversion_constant_xz"] = shear[1]
     rod_truth = {**_rod_truth(true, rod_load), **truth, "gain": 1.0}
-    nominal = replace(calibration, load=rod_load)
-    if disturbances.load_uncertainty is not None:
-        nominal = replace(nominal, load_uncertainty=disturbances.load_uncertainty * rod_load)
+    u = disturbances.load_uncertainty
+    nominal = replace(calibration, load=rod_load, load_uncertainty=u and u * rod_load)
     cell = LoadCell(name="a simulated load cell" if disturbances.one_load_cell else "")
     stated = {"film": film if disturbances.state_law else without_law(film), "load_cell": cell}
     return Experiment(
