@@ -168,6 +168,7 @@ def _lowered(
     ends = [np.sort(depth[way])[[_FEWEST - 1, -_FEWEST]] for way in ways]
     lifted, top = np.median(ends or np.zeros((1, 2)), axis=0).tolist()
     noise = _NOISE * _noise(depth)
+    near = _PRESSED * (top - lifted) + noise
     waiting = depth <= (lifted + top) / 2
     pressed = np.zeros(u.size, dtype=bool)
     levels = []
@@ -175,9 +176,12 @@ def _lowered(
         low = place[~waiting[place]]
         high = way[waiting[way]]
         if low.size:  # it may wait above the film, and overshoot
-            least = np.quantile(depth[low], 0.9) - _PRESSED * (top - lifted) - noise
-            lowest = np.flatnonzero(depth[low] > least)
-            pressed[low[lowest[0] : lowest[-1] + 1]] = True
+            lowest = low[depth[low] > np.quantile(depth[low], 0.9) - near]
+            pressed[low[(low >= lowest[0]) & (low <= lowest[-1])]] = True
+            # Of several levels before a press the indenter rests at the least deep one.
+            before = high[high < lowest[0]]
+            least = np.sort(depth[before])[:_FEWEST].max(initial=-np.inf)
+            waiting[before] = depth[before] <= least + near
             if high.size:
                 levels.append((np.median(u[low]), np.median(u[high])))
     below, above = np.ptp(levels or np.zeros((1, 2)), axis=0)

@@ -127,3 +127,15 @@ def test_a_press_without_rows_before_it_has_no_baseline():
     later = {name: values[29:] for name, values in columns.items()}
     with pytest.raises(InputError, match="hold of lines 0 to 136 has no baseline"):
         found(later, later["depth"], baseline=True)
+
+
+def test_a_plateau_at_a_lesser_depth_is_no_baseline():
+    columns = presses(0.0, {})
+    times = np.where(columns["depth"] == -1e-5, 8, 1)
+    columns = {name: np.repeat(values, times) for name, values in columns.items()}
+    half = columns["depth"] == -1e-5
+    columns["depth"][half] = -0.5e-3
+    columns["u_zz"][half] += 7e-3
+    holds = found(columns, columns["depth"], baseline=True)
+    truth = 15e-3 * np.exp(-((holds.mean["x"] / 1.5e-3) ** 2) / 2)
+    np.testing.assert_allclose(holds.mean["u_zz"], truth, atol=1e-5)
