@@ -17,7 +17,13 @@ from memscal.estimation.departures import DepartureBasis, ReducedScan, departure
 from memscal.estimation.ellipse import elliptic_departure
 from memscal.estimation.forward import ForwardModel, forward_model
 from memscal.estimation.gaussian import GaussianFit, fit_gaussian_to_points
-from memscal.estimation.outliers import OUTLIER_THRESHOLD, RasterNoise, point_weights, raster_noise
+from memscal.estimation.outliers import (
+    OUTLIER_THRESHOLD,
+    RasterNoise,
+    point_weights,
+    raster_noise,
+    variances_nearby,
+)
 from memscal.estimation.plane import MOST_READINGS, Spots, plane_departures
 from memscal.estimation.points import ScanPoints
 from memscal.estimation.voltage_map import DENSE, VoltageMap, square_root
@@ -38,6 +44,9 @@ _SAME_NOISE = 0.1
 _STEP = 1e-4
 #: A G that is free in the plane is taken where its log evidence is so much larger.
 _CLEARLY = 10.0
+#: Noise is even where its variance at such a share of the largest signal is so many times the mean.
+_SEEN = 0.1
+_EVEN = 1.4
 
 
 class CentreError(FitError):
@@ -335,6 +344,12 @@ def _weighed(
     if free_weighing.evidence < about_centre.evidence + _CLEARLY:
         return basis, about_centre.average()
     weighed = free_weighing.average()
+    left = fit.points.standardised(weighed.residual, weights)
+    signal = fit.jacobian[:, 0]
+    variance = variances_nearby(fit.points, left)[signal > _SEEN * signal.max()].mean()
+    # Noise that grows with the signal, as by errors of the stage, would be taken for G.
+    if variance > _EVEN * noise**2:
+        return basis, about_centre.average()
     found = about_centre.log_marginals
     return free_basis, replace(weighed, log_marginals=found, free=free_weighing.evidence)
 

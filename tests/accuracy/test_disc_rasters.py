@@ -101,10 +101,10 @@ def test_the_scatter_from_scan_to_scan_is_as_stated(kind):
 
 
 @pytest.mark.parametrize("kind", STEADY)
-def test_what_the_form_of_g_leaves_over_the_plane_fails_a_check(kind):
+def test_nothing_is_left_over_the_plane(kind):
     for calibration in calibrated(kind):
         checks = {check.name: check.passed for check in calibration.apparatus.checks}
-        assert checks["field_residuals"] == (kind == "alike")
+        assert checks["field_residuals"]
         assert checks["field_lobes"]
 
 
