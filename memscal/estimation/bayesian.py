@@ -336,8 +336,8 @@ def weigh_departures(
     choice = _choice(basis.flat, sizes, tuple(fitted.family for fitted in basis.families))
     given = _Conditionals.of(_Sensors.of(basis, columns, data), columns, choice, noise)
     log_marginals = np.full(len(HYPOTHESES), -np.inf)
-    # An amplitude's prior has the unit of the noise.
     log_marginals[given.number] = given.log_marginal
+    # An amplitude's prior has the unit of the noise.
     if count:
         log_marginals += count * np.log(least_noise)
     return Weighing(reduced, basis, given, noise.added, log_marginals)

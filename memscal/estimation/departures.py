@@ -227,9 +227,8 @@ class DepartureBasis:
     flat: int  # how many parameters have no prior: A, width, centre, baseline and drift
     rings: tuple[Rings, ...]  # the components of each of :data:`SHAPES`
     families: tuple[FamilyFit, ...]  # as many as fit the scan
-    angular: (
-        AngularDepartures | PlaneDepartures | None
-    )  # the last flat ones: theirs is a prior of unit variance
+    # The last flat ones: theirs is a prior of unit variance.
+    angular: AngularDepartures | PlaneDepartures | None
     _tables: dict[tuple[Side, bytes], FloatArray] = field(default_factory=dict, init=False)
 
     @property

@@ -44,7 +44,8 @@ _SAME_NOISE = 0.1
 _STEP = 1e-4
 #: A G that is free in the plane is taken where its log evidence is so much larger.
 _CLEARLY = 10.0
-#: Noise is even where its variance at such a share of the largest signal is so many times the mean.
+#: Noise is even if its variance, from such a share of the largest signal on, is at most so many
+#: times the mean.
 _SEEN = 0.1
 _EVEN = 1.4
 
@@ -344,10 +345,10 @@ def _weighed(
     if free_weighing.evidence < about_centre.evidence + _CLEARLY:
         return basis, about_centre.average()
     weighed = free_weighing.average()
+    # Noise that grows with the signal, as by errors of the stage, would be taken for G.
     left = fit.points.standardised(weighed.residual, weights)
     signal = fit.jacobian[:, 0]
     variance = variances_nearby(fit.points, left)[signal > _SEEN * signal.max()].mean()
-    # Noise that grows with the signal, as by errors of the stage, would be taken for G.
     if variance > _EVEN * noise**2:
         return basis, about_centre.average()
     found = about_centre.log_marginals
