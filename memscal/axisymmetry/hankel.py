@@ -17,6 +17,7 @@ radial function it stays such a field, and the transforms are multiplied.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any, ClassVar
 
@@ -174,16 +175,15 @@ def hankel_transform(r: FloatArray, f: FloatArray, k: FloatArray, *, order: int 
     return np.asarray(matrix @ (measure * spline(nodes).T).T)
 
 
-def bessel(order: int, x: FloatArray) -> FloatArray:
-    """Bessel function of the first kind, of order zero or more."""
+def bessel(order: int, x: FloatArray, below: Sequence[FloatArray] = ()) -> FloatArray:
+    """Bessel function of the first kind, of order zero or more; by those of two orders below."""
     if order < 2:
         return (j0, j1)[order](x)
     # Beyond the order the upward recurrence (DLMF 10.6.1) is stable, and faster.
     near = x <= order
     twice = 2 / np.where(near, 1.0, x)
-    lower = j0(x)
-    value = j1(x)
-    for n in range(1, order):
+    lower, value = below or (j0(x), j1(x))
+    for n in range(order - 1 if below else 1, order):
         lower, value = value, n * twice * value - lower
     value[near] = jv(order, x[near])
     return value

@@ -42,8 +42,9 @@ if TYPE_CHECKING:
 _MOST_WAVES = 1000
 #: In place of the order of a Bessel function: J_1(x)/x.
 TURN = -1
-#: Phase (rad) of the last wavenumber from one radius of a table to the next, and its splines.
-_TABLE_PHASE = 0.25
+#: Phase (rad) of the last wavenumber from one radius of a table to the next, and its splines: right
+#: to 4e-10.
+_TABLE_PHASE = 0.4
 _DEGREE = 7
 #: Few points read a table where its last phase (rad) is less.
 _LONGEST_PHASE = 500.0
@@ -57,14 +58,16 @@ _REACHES = 32
 _NO_SHARE = 1e-17
 
 
-def _wave(wave: int, r: FloatArray, k: FloatArray, across: bool) -> FloatArray:
+def _wave(
+    wave: int, r: FloatArray, k: FloatArray, across: bool, below: Sequence[FloatArray] = ()
+) -> FloatArray:
     """A wave at all products of radii and wavenumbers: cosines and sines where it is a slit's."""
     x = np.multiply.outer(r, k)
     if across:
         return 2 * (np.cos, np.sin)[wave](x) / k
     if wave == TURN:
         return np.divide(j1(x), x, out=np.full_like(x, 0.5), where=x != 0)
-    return bessel(wave, x)
+    return bessel(wave, x, below)
 
 
 @array_record
@@ -91,7 +94,9 @@ def wave_table(wave: int, across: bool, reach: float, nodes: bytes) -> WaveTable
     k = np.frombuffer(nodes)
     count = int(np.ceil(reach * k[-1] / _TABLE_PHASE)) + 1
     radii = reach / count * np.arange(-_DEGREE, count + _DEGREE + 1.0)
-    values = _wave(wave, radii, k, across)
+    lower = range(wave - 2, wave) if wave > 1 else ()
+    below = [wave_table(order, across, reach, nodes).values for order in lower]
+    values = _wave(wave, radii, k, across, below)
     return WaveTable(radii, values, make_interp_spline(radii, values, k=_DEGREE))
 
 
@@ -335,21 +340,23 @@ class ForwardModel:
         size = np.hypot(e1, e2)
         tilt = 0.5 * np.arctan2(e2, e1)
         half = 0.5 * np.multiply.outer(self.k, sigma) ** 2
+        step = np.exp(2j * np.subtract.outer(angle, tilt))
+        phasor = np.ones_like(step)
         responses = np.zeros((len(ellipses), angle.size))
         slope = np.zeros_like(angle)
         turn = np.zeros_like(angle)
         for m in range(_HARMONICS):
             kernels = ive(m, half * size) * np.exp(-half * (1 - size))
             profiles = (1 if m == 0 else 2) * self._summed(geometry, 2 * m, kernels)
-            phase = 2 * m * np.subtract.outer(angle, tilt)
-            responses += (np.cos(phase) * profiles).T
+            responses += (phasor.real * profiles).T
             # By J_n' = (J_(n-1) - J_(n+1))/2.
             steeper = self.k * kernels[:, 0]
             steepness = -self._summed(geometry, 2 * m + 1, steeper)
             if m > 0:
                 steepness += self._summed(geometry, 2 * m - 1, steeper)
-            slope += np.cos(phase[:, 0]) * steepness
-            turn -= 2 * m * np.sin(phase[:, 0]) * profiles[:, 0]
+            slope += phasor.real[:, 0] * steepness
+            turn -= 2 * m * phasor.imag[:, 0] * profiles[:, 0]
+            phasor *= step
         turn = np.divide(turn, geometry.radius, out=turn, where=geometry.radius > 0)
         return responses, geometry.towards * slope + np.stack([-across, toward]) * turn
 

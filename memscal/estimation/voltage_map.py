@@ -109,22 +109,27 @@ class VoltageMap:
                 dense = right if isinstance(right, np.ndarray) else right.toarray()
                 columns = factor.correlate_adjoint(noise[:, None] * dense)
             parts.append((left, columns))
-        weight = noise**2 if factor is None else np.ones_like(noise)
+        scale = noise if factor is None else np.ones_like(noise)
         total: FloatArray = np.zeros((len(self), len(self)))
         for i, (left, right) in enumerate(parts):
-            total += left @ _gram(right, right, weight) @ left.T
+            total += left @ _gram(right, right, scale) @ left.T
             for other, columns in parts[:i]:
-                product = left @ _gram(right, columns, weight) @ other.T
+                product = left @ _gram(right, columns, scale) @ other.T
                 total += product + product.T
         return total
 
 
-def _gram(first: Any, second: Any, weight: FloatArray | None = None) -> FloatArray:
-    """Products of all columns, by blocks of rows."""
+def _gram(first: Any, second: Any, scale: FloatArray | None = None) -> FloatArray:
+    """Products of all columns, both times a scale (n,), by blocks of rows."""
     total = np.zeros((first.shape[1], *second.shape[1:]))
     for rows in slices(first.shape[0], BLOCK):
-        weighted = second[rows] if weight is None else weight[rows, None] * second[rows]
-        total = total + first[rows].T @ weighted
+        left = first[rows]
+        right = second[rows]
+        if scale is not None:
+            left = scale[rows, None] * left
+            # Of one array numpy makes half of a symmetric product.
+            right = left if first is second else scale[rows, None] * right
+        total = total + left.T @ right
     return total
 
 
