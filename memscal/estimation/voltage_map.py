@@ -44,17 +44,9 @@ class VoltageMap:
     def stacked(cls, maps: Sequence[VoltageMap]) -> VoltageMap:
         """Put maps below each other; those of the same columns share them."""
         stacked = cls(())
-        count = sum(len(each) for each in maps)
-        first = 0
-        for each in maps:
-            last = first + len(each)
-            parts = []
-            for left, right in each.parts:
-                rows = np.zeros((count, left.shape[1]))
-                rows[first:last] = left
-                parts.append((rows, right))
-            stacked += cls(tuple(parts))
-            first = last
+        ends = np.cumsum([len(each) for each in maps])
+        for each, rows in zip(maps, np.split(np.eye(ends[-1]), ends[:-1], axis=1), strict=True):
+            stacked += rows @ each
         return stacked
 
     def __len__(self) -> int:
