@@ -11,13 +11,13 @@ profiles from any source.
 """
 
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
 
 from memscal.axisymmetry.grids import EvenGrid, FieldGrid, on_grid
-from memscal.axisymmetry.hankel import radial_spline
+from memscal.axisymmetry.hankel import radial_spline, up_to
 from memscal.deconvolution.division import DivisionProblem, Regulariser, chosen_method
 from memscal.errors import FitError, InputError
 from memscal.estimation.bayesian import Bayesian
@@ -87,8 +87,7 @@ class Field:
     @property
     def r(self) -> FloatArray:
         """Radii of the profile, shape (p,), in m."""
-        x = self.grid.axes[0]
-        return x[x.size // 2 :]
+        return self.x[self.x.size // 2 :]
 
     @cached_property
     def radial(self) -> FloatArray:
@@ -174,13 +173,9 @@ def lift(r: FloatArray, profile: FloatArray, spacing: float, extent: float) -> F
             f"A field of half side {extent:g} m cannot have points {spacing:g} m apart.",
             cure=f"Give both in m: the extent is one to {_MOST_POINTS} times the spacing.",
         )
-    spline = radial_spline(r, profile)
-
-    def continued(radius: FloatArray) -> FloatArray:
-        return np.where(radius <= r[-1], spline(np.minimum(radius, r[-1])), 0.0)
-
+    ending = partial(up_to, r[-1], radial_spline(r, profile))
     grid = EvenGrid(int(np.ceil(extent / spacing)) + 1, spacing)
-    return Field(grid, on_grid(continued, grid, spacing / 2))
+    return Field(grid, on_grid(ending, grid, spacing / 2))
 
 
 def divide(
@@ -282,7 +277,7 @@ def normalise(quotient: Field) -> tuple[float, Field]:
     >>> round(a / (np.pi * 1e-6), 6), round(g.integral, 6)
     (1.0, 1.0)
     """
-    a = quotient.grid.integrate(quotient.values)
+    a = quotient.integral
     if not a > 0:
         raise FitError(
             f"The quotient of the fields adds up to {a:.3g} V/Pa.",
