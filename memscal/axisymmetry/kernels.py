@@ -197,15 +197,12 @@ class Rings:
     @classmethod
     def joined(cls, parts: Sequence[Rings]) -> Rings:
         """Return all rings of several sets."""
-        sets = ((rings.radius, rings.blur, rings.amplitude) for rings in parts)
-        return cls(*map(np.concatenate, zip(*sets, strict=True)))
+        return cls(*np.hstack([[rings.radius, rings.blur, rings.amplitude] for rings in parts]))
 
     def transform(self, k: FloatArray) -> FloatArray:
         """Hankel transforms at ``k`` (rad/m), shape (k, m)."""
-        # Most shapes have one blur, or no radius.
-        blur = self.blur if np.ptp(self.blur) else self.blur[:1]
-        blurred = self.amplitude * np.exp(-0.5 * np.multiply.outer(k, blur) ** 2)
-        return blurred * j0(np.multiply.outer(k, self.radius)) if self.radius.any() else blurred
+        blurred = self.amplitude * np.exp(-0.5 * np.multiply.outer(k, self.blur) ** 2)
+        return blurred * j0(np.multiply.outer(k, self.radius))
 
     def radial(self, r: FloatArray) -> FloatArray:
         """Values at radii ``r`` (m), shape (r, m), in V/Pa/m^2."""
