@@ -120,32 +120,28 @@ def filtered_division(problem: DivisionProblem, window: FloatArray) -> Division:
     return Division(problem.grid.inverse(quotient * window), window)
 
 
-class _Own:
+@keyword_value_record
+class _Own(Regulariser):
     """Base of memscal's regularisers: refuses values of their options that mean nothing."""
 
-    name: ClassVar[str]
-    assumes: ClassVar[str]
-    fails: ClassVar[str]
+    amplitude: float = 1.0  # a factor on the rule's own choice
 
     def __post_init__(self) -> None:
-        options = vars(self)
-        amplitude = options.get("amplitude", 1.0)
+        amplitude: Any = self.amplitude
         if not isinstance(amplitude, Real) or not 0 < float(amplitude) < math.inf:
             raise InputError(
                 f"The amplitude of method {self.name} is {amplitude}, but it must be a positive "
                 "number.",
                 cure="It is a factor on the rule's own choice: 1 keeps that, 2 doubles the noise.",
             )
-        if "seed" in options:
-            require_count(self.name, "seed", options["seed"], 0)
 
 
 @keyword_value_record
 class WhiteNoise(_Own):
     """Expectation of the paper's method over all draws of its complex noise, of variance s^2."""
 
-    # White noise n leaves the numerator's mean; E[1/(z + n)] = (1 - exp(-|z|^2/s^2))/z.
-    amplitude: float = 1.0  # of the noise: s over a tenth of the weakest relevant component
+    # White noise n leaves the numerator's mean; E[1/(z + n)] = (1 - exp(-|z|^2/s^2))/z. The
+    # amplitude is that of the noise: s over a tenth of the weakest relevant component.
     name = "white-noise"
     assumes = "G is negligible beyond the wavenumber where the voltage sinks into its noise."
     fails = "A G with fine detail (sharp edges, a narrow ring) is smoothed to the resolved band."
@@ -161,11 +157,14 @@ class WhiteNoise(_Own):
 class WhiteNoiseDraw(_Own):
     """One seeded draw of the paper's method: its quotient has no finite variance."""
 
-    amplitude: float = 1.0  # of the noise, as in WhiteNoise
     seed: int = 0
     name = "white-noise-draw"
     assumes = WhiteNoise.assumes
     fails = "Draws are heavy-tailed: some carry ripples that others do not."
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        require_count(self.name, "seed", self.seed, 0)
 
     def divide(self, problem: DivisionProblem) -> Division:
         """Divide one draw; the window is that of its expectation."""
@@ -188,8 +187,8 @@ class Tikhonov(_Own):
     r"""Minimiser of :math:`|\hat\sigma \hat g - \hat u|^2 + \alpha |\hat g|^2`."""
 
     # Its window closes more slowly than the white noise's, at the same wavenumber: sqrt(alpha) is
-    # the paper's noise amplitude.
-    amplitude: float = 1.0  # root of alpha over a tenth of the weakest relevant component
+    # the paper's noise amplitude. The amplitude is that root over a tenth of the weakest relevant
+    # component.
     name = "tikhonov"
     assumes = "G has little power; all wavenumbers are equally likely to carry it."
     fails = "Every component is a little too small, the peak of G with them."
@@ -205,7 +204,7 @@ class Tikhonov(_Own):
 class Wiener(_Own):
     """Wiener-Hunt restoration: the quotient with a Laplacian penalty."""
 
-    amplitude: float = 1.0  # root of the penalty over a tenth of the weakest relevant component
+    # The amplitude is the root of the penalty over a tenth of the weakest relevant component.
     name = "wiener"
     assumes = "G is smooth; the noise of the lifted field is white."
     fails = "A lifted line scan has ring-shaped noise, not white: the penalty is a guess."
