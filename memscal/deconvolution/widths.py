@@ -5,7 +5,7 @@ import numpy as np
 from memscal.axisymmetry.hankel import radial_spline, ring_areas
 from memscal.axisymmetry.kernels import unit_gaussian, unit_gaussian_slope
 from memscal.deconvolution.fourier_ratio import Field
-from memscal.estimation.gaussian import gauss_newton
+from memscal.estimation.gaussian import gauss_newton, trust_region
 from memscal.model.arrays import ArrayPair, FloatArray, array_record
 
 #: Points per step of the profile between which the half maximum is interpolated.
@@ -58,16 +58,8 @@ def fit_gaussian(g: Field, start: float | None = None) -> float:
     width = gauss_newton(linearise, begin, tolerance=1e-10)
     if width is not None and width[0] * start > 2 * narrowest:
         return float(width[0] * start)
-    from scipy.optimize import least_squares
-
-    def misfit(scaled: FloatArray) -> FloatArray:
-        return linearise(scaled)[0]
-
-    def slope(scaled: FloatArray) -> FloatArray:
-        return linearise(scaled)[1]
-
     bounds = (narrowest / start, np.inf)
-    bounded = least_squares(misfit, begin, slope, bounds, xtol=1e-12, ftol=1e-14, gtol=1e-14)
+    bounded = trust_region(linearise, begin, bounds=bounds, xtol=1e-12, ftol=1e-14, gtol=1e-14)
     return float(bounded.x[0] * start)
 
 

@@ -343,7 +343,16 @@ def _solve(
         solution = gauss_newton(linearised, begin, tolerance=tolerance, knee=knee)
         # At a width of zero every slope by the width is zero: steps do not leave it.
         if solution is None or solution[1] < _NARROWEST:
-            result = _trust_region(linearised, begin, robust)
+            result = trust_region(
+                linearised,
+                begin,
+                loss="soft_l1" if robust else "linear",
+                f_scale=_KNEE,
+                xtol=1e-10,
+                ftol=1e-12,
+                gtol=1e-10,
+                max_nfev=100,
+            )
             if not result.success:
                 raise _undetermined(model, linearise(model, result.x * scale).conversion_constant)
             solution = result.x
@@ -357,27 +366,17 @@ def _solve(
     return fit
 
 
-def _trust_region(linearised: Linearised, start: FloatArray, robust: bool) -> Any:
+def trust_region(linearise: Linearised, start: FloatArray, **options: Any) -> Any:
     """Minimise the loss of the residuals from anywhere, with a trust region."""
     from scipy.optimize import least_squares
 
     def residual(place: FloatArray) -> FloatArray:
-        return linearised(place)[0]
+        return linearise(place)[0]
 
     def slope(place: FloatArray) -> FloatArray:
-        return linearised(place)[1]
+        return linearise(place)[1]
 
-    return least_squares(
-        residual,
-        start,
-        slope,
-        loss="soft_l1" if robust else "linear",
-        f_scale=_KNEE,
-        xtol=1e-10,
-        ftol=1e-12,
-        gtol=1e-10,
-        max_nfev=100,
-    )
+    return least_squares(residual, start, slope, **options)
 
 
 def linearise(model: ForwardModel, theta: FloatArray) -> GaussianFit:
