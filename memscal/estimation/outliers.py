@@ -61,18 +61,11 @@ def raster_noise(
     ordinary = np.flatnonzero(outlier >= OUTLIER_WEIGHT)
     group = grouped(points.scan, points.place_numbers("index"), points.load)[ordinary]
     places, group = np.unique(group, return_inverse=True)
-    degrees = group.size - places.size
-    if degrees < _FEWEST_DIFFERENCES:
-        return _third_difference_noise(points, residual, ordinary)
-    left = residual[ordinary]
-    left = left - (np.bincount(group, left) / np.bincount(group))[group]
-    return RasterNoise(float(np.sqrt(left @ left / degrees)), degrees)
-
-
-def _third_difference_noise(
-    points: ScanPoints, residual: FloatArray, ordinary: IndexArray
-) -> RasterNoise | None:
-    """Noise of one reading by divided third differences along the rows of a raster."""
+    repeats = group.size - places.size
+    if repeats >= _FEWEST_DIFFERENCES:
+        left = residual[ordinary]
+        left = left - (np.bincount(group, left) / np.bincount(group))[group]
+        return RasterNoise(float(np.sqrt(left @ left / repeats)), repeats)
     differences = _third_differences(points, ordinary)
     count = differences.shape[0]
     if count < _FEWEST_DIFFERENCES:
