@@ -461,15 +461,13 @@ def joined_points(scans: Sequence[ScanPoints], owners: Sequence[int] | None = No
 
 
 def _joined_decorrelation(scans: Sequence[ScanPoints]) -> Decorrelation | None:
-    if all(points.decorrelation is None for points in scans):
-        return None
     blocks = []
     first = 0
     for points in scans:
-        known = points.decorrelation.blocks if points.decorrelation else ()
-        blocks += [(rows + first, root) for rows, root in known]
+        if points.decorrelation:
+            blocks += [(rows + first, root) for rows, root in points.decorrelation.blocks]
         first += points.u.size
-    return Decorrelation(tuple(blocks))
+    return Decorrelation(tuple(blocks)) if blocks else None
 
 
 def _decorrelation(correlation: FloatArray, keep: BoolArray) -> Decorrelation:
