@@ -178,14 +178,17 @@ class Lattice:
 
     def inverse(self, spectrum: FloatArray) -> FloatArray:
         """Return the field of a spectrum whose origin is the first point: a quotient's."""
-        shape = (self.y.size, self.x.size)
-        return scipy.fft.fftshift(scipy.fft.irfft2(spectrum, s=shape)) / self.cell_area
+        return scipy.fft.fftshift(self._back(spectrum))
+
+    def _back(self, spectrum: FloatArray) -> FloatArray:
+        """Undo :meth:`forward`."""
+        return scipy.fft.irfft2(spectrum, s=(self.y.size, self.x.size)) / self.cell_area
 
     def sampled(self, plane: Callable[[FloatArray, FloatArray], FloatArray]) -> FloatArray:
         """Return a field by its transform (ky, kx) about the axis, as far as this samples it."""
         ky, kx = self._wavenumber_axes
         spectrum = plane(ky, kx) * np.exp(1j * np.add.outer(ky * self.y[0], kx * self.x[0]))
-        return scipy.fft.irfft2(spectrum, s=(self.y.size, self.x.size)) / self.cell_area
+        return self._back(spectrum)
 
     def transfer(self, field: FloatArray) -> FloatArray:
         """Fourier transform about the central point."""
@@ -203,12 +206,11 @@ class Lattice:
 
     def filtered(self, field: FloatArray, factor: FloatArray) -> FloatArray:
         """Multiply the transform of a field by a real factor."""
-        return scipy.fft.irfft2(scipy.fft.rfft2(field) * factor, s=field.shape)
+        return self._back(self.forward(field) * factor)
 
     def convolve(self, kernel: FloatArray, field: FloatArray) -> FloatArray:
         """Convolve a kernel centred on the central point with a field of the lattice."""
-        spectrum = self.transfer(kernel) * self.forward(field)
-        return scipy.fft.irfft2(spectrum, s=field.shape) / self.cell_area
+        return self._back(self.transfer(kernel) * self.forward(field))
 
     def integrate(self, field: FloatArray) -> float:
         """Integral of a field over the lattice."""
