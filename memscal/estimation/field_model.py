@@ -97,11 +97,6 @@ class FieldModel(ForwardModel):
         plane = self._plane
         return np.stack([self._read(geometry, -1j * k * spectrum) for k in (plane.kx, plane.ky)])
 
-    def radial_derivative(self, geometry: Geometry, kernel: FloatArray) -> FloatArray:
-        """Derivative of :meth:`signal` by the distance from the centre, shape (n,), in V/m."""
-        shift = self.shift_derivative(geometry, kernel)
-        return np.asarray(np.sum(geometry.towards * shift, axis=0))
-
     def elliptic(self, geometry: Geometry, ellipses: FloatArray) -> ArrayPair:
         """Responses (m, n) per A to (s, e1, e2), (m, 3); slopes (2, n) of the first by place."""
         kx = self._plane.kx

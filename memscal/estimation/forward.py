@@ -126,9 +126,7 @@ class Geometry:
     _waves: dict[int, FloatArray] = field(default_factory=dict, init=False)  # at the points
     _interpolations: dict[int, csr_array] = field(default_factory=dict, init=False)
 
-    def summed(
-        self, wave: int, spread: FloatArray, rows: slice | BoolArray = slice(None)
-    ) -> FloatArray:
+    def summed(self, wave: int, spread: FloatArray, rows: slice | BoolArray) -> FloatArray:
         """Sum a wave over the nodes, by factors (nodes,) or (nodes, m), at some of the points."""
         if self.radius.size > DENSE or wave > 1:
             count = self._nodes_of(spread)
@@ -307,17 +305,19 @@ class ForwardModel:
 
     def radial_derivative(self, geometry: Geometry, kernel: FloatArray) -> FloatArray:
         """Derivative of :meth:`signal` by the distance from the centre, in V/m."""
-        if self.points.order:
-            slope, _ = self._vector_slopes(geometry, kernel)
-            return np.asarray(-geometry.towards[self.axis] * slope)
+        if self.points.order or not self.sums_waves:
+            shift = self.shift_derivative(geometry, kernel)
+            return np.asarray(np.sum(geometry.towards * shift, axis=0))
         return -self._summed(geometry, 1, (self.k * kernel.T).T)
 
     def shift_derivative(self, geometry: Geometry, kernel: FloatArray) -> FloatArray:
         """Derivatives of :meth:`signal` by each point's centre, shape (2, n), in V/m."""
-        # A vector's component changes by f/R across its direction, too.
         if self.points.order == 0:
             return geometry.towards * self.radial_derivative(geometry, kernel)
-        slope, turn = self._vector_slopes(geometry, kernel)
+        # A vector's radial component f changes by f/R across its direction, too; on the axis by the
+        # same.
+        turn = self._summed(geometry, TURN, self.k * kernel)
+        slope = self._summed(geometry, 0, self.k * kernel) - turn
         shift = geometry.towards[self.axis] * geometry.towards * (turn - slope)
         shift[self.axis] -= turn
         return np.asarray(shift)
@@ -386,11 +386,6 @@ class ForwardModel:
             rows = self.points.scan == scan
             volts[rows] = radial_spline(table, profile)(distance[rows])
         return self.points.load[:, None] * volts
-
-    def _vector_slopes(self, geometry: Geometry, kernel: FloatArray) -> list[FloatArray]:
-        """Radial component f of a vector: its derivative by R, and f/R; on the axis the same."""
-        turn = self._summed(geometry, TURN, self.k * kernel)
-        return [self._summed(geometry, 0, self.k * kernel) - turn, turn]
 
     def _summed(self, geometry: Geometry, wave: int, kernel: FloatArray) -> FloatArray:
         """Voltages by kernels, each scan through its reference: a wave summed over the nodes."""
