@@ -21,6 +21,7 @@ from memscal.estimation.residuals import FEWEST_RESIDUALS, TestOutcome, ratio_ou
 from memscal.estimation.voltage_map import evenly, square_root, triangular
 from memscal.model.arrays import TINY, BoolArray, FloatArray, IndexArray, array_record, value_record
 from memscal.model.checks import FALSE_ALARM
+from memscal.readings.find_places import clusters
 
 #: More groups than this are held out several at a time.
 _MOST_FOLDS = 10
@@ -39,9 +40,7 @@ class HeldOut(TestOutcome):
 
 def load_groups(load: FloatArray) -> IndexArray:
     """Number the loads: those closer than a twentieth of their mean are one, shape (n,)."""
-    levels = np.unique(load)
-    start = np.concatenate([[0], np.cumsum(np.diff(levels) > _SAME_LOAD * load.mean())])
-    return np.asarray(start[np.searchsorted(levels, load)], dtype=np.intp)
+    return clusters(load, _SAME_LOAD * load.mean())[0]
 
 
 def hold_out(estimate: ProfileEstimate, group: IndexArray) -> HeldOut | None:

@@ -28,8 +28,8 @@ def places_of(x: FloatArray, y: FloatArray, repeat: IndexArray) -> Places:
     # Close is a tenth of the usual distance within a pass. On a plane the readings at one node of
     # an even lattice share a place too.
     close = _close(x, y, repeat)
-    columns, step_x = _clusters(x, close)
-    rows, step_y = _clusters(y, close)
+    columns, step_x = clusters(x, close)
+    rows, step_y = clusters(y, close)
     # Along a line the neighbours of a place are those in order.
     width = np.ptp(x)
     height = np.ptp(y)
@@ -126,7 +126,7 @@ def _linked(x: FloatArray, y: FloatArray, close: float, passes: int) -> IndexArr
     return np.asarray(connected_components(links, directed=False)[1][index], dtype=np.intp)
 
 
-def _clusters(values: FloatArray, gap: float) -> tuple[IndexArray, float]:
+def clusters(values: FloatArray, gap: float) -> tuple[IndexArray, float]:
     """Number groups of values, in order, that no gap wider than ``gap`` parts; and their step."""
     order = np.argsort(values, kind="stable")
     index = np.empty(values.size, dtype=np.intp)
