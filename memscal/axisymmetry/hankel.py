@@ -166,9 +166,8 @@ def hankel_transform(r: FloatArray, f: FloatArray, k: FloatArray, *, order: int 
     # Panels between knots that hold little of a phase.
     phases = np.diff(knots) * np.max(np.abs(k))
     pieces = np.maximum(np.ceil(phases / _TABLE_PHASE), 1).astype(int)
-    widths = np.repeat(np.diff(knots) / pieces, pieces)
-    within = np.concatenate([np.arange(count) for count in pieces])
-    edges = np.append(np.repeat(knots[:-1], pieces) + within * widths, knots[-1])
+    places = np.append(0, np.cumsum(pieces))
+    edges = np.interp(np.arange(places[-1] + 1), places, knots)
     nodes, weights = gauss_between(edges, _TABLE_ORDER)
     measure = 2 * np.pi * weights * nodes
     matrix = bessel(order, np.multiply.outer(k, nodes))
