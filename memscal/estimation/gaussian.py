@@ -18,7 +18,7 @@ from memscal.estimation.forward import ForwardModel, Geometry
 from memscal.estimation.outliers import robust_scale
 from memscal.estimation.points import ScanPoints
 from memscal.estimation.voltage_map import VoltageMap, evenly, triangular
-from memscal.model.arrays import TINY, ArrayPair, FloatArray, IndexArray, array_record
+from memscal.model.arrays import TINY, ArrayPair, ArrayTriple, FloatArray, IndexArray, array_record
 
 _MOST_STEPS = 20
 _MOST_HALVINGS = 5
@@ -113,23 +113,17 @@ def some_points(points: ScanPoints) -> IndexArray:
 def _robust_start(model: ForwardModel, weights: FloatArray) -> FloatArray:
     """Parameters to start from: each scan's own, but A and the width at the medians of all."""
     points = model.points
-    shapes = []
-    centres = []
-    drifts = []
-    for scan, free in enumerate(points.free):
-        own = replace(model, points=points.only(scan), references=(model.references[scan],))
-        start = _robust_start_of_scan(own, weights[points.scan == scan])
-        last = 2 + int(free.sum())
-        shapes.append(start[:2])
-        centres.append(start[2:last])
-        drifts.append(start[last:])
-    shape = np.median(shapes, axis=0)
+    starts = []
+    for scan, reference in enumerate(model.references):
+        own = replace(model, points=points.only(scan), references=(reference,))
+        starts.append(_robust_start_of_scan(own, weights[points.scan == scan]))
+    shapes, centres, drifts = zip(*starts, strict=True)
     others = np.zeros(points.curved.size + points.ellipse)
-    return np.concatenate([shape, *centres, *drifts, others])
+    return np.concatenate([np.median(shapes, axis=0), *centres, *drifts, others])
 
 
-def _robust_start_of_scan(model: ForwardModel, weights: FloatArray) -> FloatArray:
-    """Best of a grid of centres and widths, by the sum of absolute residuals."""
+def _robust_start_of_scan(model: ForwardModel, weights: FloatArray) -> ArrayTriple:
+    """A and width, centre, and drift of the best of a grid, by the sum of absolute residuals."""
     # A single outlier can be the largest voltage of a scan: positions are tried, not read off.
     points = model.points
     centres = _trial_centres(model)
@@ -164,9 +158,8 @@ def _robust_start_of_scan(model: ForwardModel, weights: FloatArray) -> FloatArra
     if not amplitudes[i] > 0:
         raise _undetermined(model)
     baseline = np.linalg.lstsq(drift, data - amplitudes[i] * shapes[i], rcond=None)[0]
-    sigma = widths[i // len(centres)]
-    centre = centres[i % len(centres)][points.free[0]]
-    return np.concatenate([[amplitudes[i], sigma], centre, baseline])
+    shape = np.array([amplitudes[i], widths[i // len(centres)]])
+    return shape, centres[i % len(centres)][points.free[0]], baseline
 
 
 def _amplitudes(shapes: FloatArray, data: FloatArray, drift: FloatArray) -> ArrayPair:
@@ -227,6 +220,7 @@ _NO_WIDTH = 0.1
 class GaussianFit:
     """Best Gaussian in data space, and the model linearised about it."""
 
+    theta: FloatArray  # (p,): all parameters, in the order of the jacobian
     conversion_constant: float  # A, in V/Pa
     sigma: float  # standard deviation of the Gaussian, in m
     centre: FloatArray  # (scans, 2): of the sensor, in m; zero across a line
@@ -299,12 +293,7 @@ def fit_gaussian_to_points(
         chosen = some_points(points)
         some = replace(model, points=points.selected(chosen))
         start = fit_gaussian_to_points(some, weights[chosen])
-    if start is None:
-        theta = _robust_start(model, weights)
-    else:
-        shape = [start.conversion_constant, start.sigma]
-        ellipticity = start.ellipticity[: points.ellipse]
-        theta = np.concatenate([shape, start.centre[points.free], start.drift, ellipticity])
+    theta = _robust_start(model, weights) if start is None else start.theta
     return _solve(model, weights, theta, robust)
 
 
@@ -381,19 +370,18 @@ def trust_region(linearise: Linearised, start: FloatArray, **options: Any) -> An
 
 def linearise(model: ForwardModel, theta: FloatArray) -> GaussianFit:
     """Return the model and its derivatives at A, sigma, centres, drifts and ellipticity."""
-    free = model.points.free
-    ellipse = theta.size - model.points.ellipse
-    centres = model.points.centres
+    points = model.points
+    ellipse = theta.size - points.ellipse
     amplitude = float(theta[0])
     sigma = float(theta[1])
-    centre = np.zeros(free.shape)
-    centre[free] = theta[centres]
-    drift = theta[centres.stop : ellipse]
+    centre = np.zeros(points.free.shape)
+    centre[points.free] = theta[points.centres]
+    drift = theta[points.centres.stop : ellipse]
     ellipticity = np.zeros(2)
-    ellipticity[: theta.size - ellipse] = theta[ellipse:]
+    ellipticity[: points.ellipse] = theta[ellipse:]
     geometry = model.geometry(centre)
     kernel = gaussian_transfer(model.k, sigma)
-    if model.points.ellipse:
+    if points.ellipse:
         columns, shift = elliptic_columns(model, geometry, sigma, ellipticity)
         shift = amplitude * shift
     else:
@@ -401,11 +389,11 @@ def linearise(model: ForwardModel, theta: FloatArray) -> GaussianFit:
         both = np.stack([kernel, gaussian_transfer_slope(model.k, sigma)], axis=1)
         columns = model.signal(geometry, both)
     signal = columns[:, :1]
-    by_shape = amplitude * columns[:, 1 : 2 + model.points.ellipse]
+    by_shape = amplitude * columns[:, 1 : 2 + points.ellipse]
     centring = model.by_free_centres(shift)
     baseline = model.drift_columns
     jacobian = np.hstack([signal, by_shape[:, :1], centring, baseline, by_shape[:, 1:]])
     predicted = amplitude * columns[:, 0] + baseline @ drift
     return GaussianFit(
-        amplitude, sigma, centre, drift, ellipticity, model.points, geometry, jacobian, predicted
+        theta, amplitude, sigma, centre, drift, ellipticity, points, geometry, jacobian, predicted
     )
