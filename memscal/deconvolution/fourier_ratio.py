@@ -244,9 +244,9 @@ def divide(
         weakest = (weakest, float(voltage.spectrum()[1][last]))
     for modulus in weakest:
         require_positive("weakest relevant component", modulus)
-    fields = (voltage.values, stress.values)
-    weakest = weakest[::-1]
-    problem = DivisionProblem(voltage.grid, *fields, *weakest, transform=stress.transform)
+    problem = DivisionProblem(
+        voltage.grid, voltage.values, stress.values, *weakest[::-1], transform=stress.transform
+    )
     division = regulariser.divide(problem)
     return Quotient(voltage.grid, division.field, division.window)
 

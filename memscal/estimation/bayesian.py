@@ -373,8 +373,6 @@ class Weighing:
         given = self.given
         model = self.reduced.model
         fit = self.reduced.fit
-        scatter = np.zeros(len(HYPOTHESES))
-        scatter[given.number] = given.scatter
         probabilities = []
         for prior in self.priors:
             # Bayes' theorem; negligible probabilities are set to zero.
@@ -402,7 +400,7 @@ class Weighing:
             mean=mean,
             covariance=root @ root.T,
             gain=self.reduced.by_voltages(gain[:, : self.reduced.data.size]),
-            noise=float(np.sqrt(estimate @ scatter)),
+            noise=float(np.sqrt(p @ used.scatter)),
             probability=estimate,
             residual=model.points.u - fit.predicted - self.basis.voltages(model, fit, mean),
             log_marginals=self.log_marginals,

@@ -140,11 +140,11 @@ def hysteresis_test(estimate: ProfileEstimate) -> BranchesApart | None:
     if both.any():
         return BranchesApart(fit.tested(values, rows), values, errors)
     distance, error, degrees = _centres_apart(estimate, fit, sign)
-    outcomes = (
+    outcome = min(
         fit.tested(values, rows, of=2),
         ratio_outcome((distance / error) ** 2, 1, degrees, of=2),
+        key=lambda outcome: outcome.p_value,
     )
-    outcome = min(outcomes, key=lambda outcome: outcome.p_value)
     return BranchesApart(outcome, np.append(values, distance), np.append(errors, error))
 
 

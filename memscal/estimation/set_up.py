@@ -124,9 +124,9 @@ def require_same_set_up(
     """Refuse a reference of another film, rod or load than its scan; or return the differences."""
     # :func:`stated_differences` has the rule; ``None`` stands for the reference in the scan, and an
     # alternative may have another law and friction, which it is given for.
-    given = [r or scan.reference for scan, r in zip(scans, references, strict=True)]
     differences = []
-    for scan, stress in zip(scans, given, strict=True):
+    for scan, reference in zip(scans, references, strict=True):
+        stress = reference or scan.reference
         if stress is not None and stress.form is None:
             differences += _other_set_up(scan, stress, "reference")
     for scan, stress in zip(scans, alternatives, strict=False):
