@@ -99,9 +99,6 @@ def _close(x: FloatArray, y: FloatArray, repeat: IndexArray) -> float:
 
 def _nearest(places: NDArray[np.complex128]) -> FloatArray:
     """Return the distance of each of several distinct positions x + iy to its nearest one."""
-    if not np.ptp(places.imag) or not np.ptp(places.real):
-        gaps = np.abs(np.diff(places, prepend=np.inf, append=np.inf))
-        return np.minimum(gaps[:-1], gaps[1:])
     from scipy.spatial import KDTree
 
     plane = places.view(np.float64).reshape(-1, 2)
