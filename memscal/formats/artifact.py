@@ -77,10 +77,10 @@ def artifact_tree(data: ApparatusData) -> Group:
         "reconvolution": write_record(reconvolution, data.reconvolution),
         "parameters": groups.parameter_group(data.parameters, data.budget),
         "quality": groups.quality_group(data.checks),
-        "sample": groups.sample_group(data.film),
-        "instrument": groups.instrument_group(data.sensor, data.load_cell, data.stage),
+        "sample": groups.sample_group(data),
+        "instrument": groups.instrument_group(data),
         **groups.circumstances(data),
-        "indenter": groups.indenter_group(data.indenter, data.load),
+        "indenter": groups.indenter_group(data.indenter, data),
         **groups.reference_groups(data.reference),
         "process": write_record(records.PROCESS, data.process),
     }

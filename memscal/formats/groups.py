@@ -22,6 +22,7 @@ from memscal.model.checks import QualityCheck, messages_from_json
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Cone, Indenter, Profile, Rod, RoundIndenter, Sphere
 from memscal.model.instrument import Equipment, LoadCell, StressSensor, User
+from memscal.model.measured_stress import MeasuredScan
 from memscal.model.notation import VOLTS, Reading
 from memscal.model.provenance import Process, SourceFile
 from memscal.model.quantities import TRUTH, Quantity, Record, estimated_quantity
@@ -29,6 +30,7 @@ from memscal.model.scan import Scan
 from memscal.model.stress import IdealReference, StressField, StressProfile
 
 _NOTHING: Mapping[str, Any] = MappingProxyType({})
+_MeasuredOn = Scan | ApparatusData | MeasuredScan
 
 
 @dataclass(frozen=True)
@@ -76,12 +78,12 @@ KINDS = {
 
 
 def write_record(record: Record, stated: object, **others: Node) -> Group:
-    """Return the group of an object or a mapping; an axis that is no quantity counts from 0."""
+    """Return the group of what an object or a mapping states; other axes count from 0."""
     children: Nodes = {}
     keys = {quantity.key for quantity in record.quantities}
     for quantity in record.quantities:
         name = quantity.name
-        value = stated[name] if isinstance(stated, Mapping) else getattr(stated, name)
+        value = stated.get(name) if isinstance(stated, Mapping) else getattr(stated, name, None)
         kind = KINDS.get(quantity.dimension)
         if value is None:
             continue
@@ -297,31 +299,24 @@ def read_stated(file: SafeFile) -> tuple[ElasticFilm | None, RoundIndenter | Non
 _NOWHERE = {"depends_on": "."}
 
 
-def sample_group(film: ElasticFilm | None, lubrication: str = "", lubricant: str = "") -> Group:
+def sample_group(of: _MeasuredOn) -> Group:
     """Return the NXsample that holds the film, and how it was lubricated."""
-    stated = {"lubrication": lubrication, "lubricant": lubricant}
     children = {}
-    if film is not None:
-        children["film"] = write_record(records.FILM, film)
-    sample = write_record(records.SAMPLE, stated)
+    if of.film is not None:
+        children["film"] = write_record(records.FILM, of.film)
+    sample = write_record(records.SAMPLE, of)
     return Group("NXsample", {**children, **sample.children, **_NOWHERE})
 
 
-def indenter_group(
-    indenter: Indenter | None,
-    load: float | None = None,
-    load_uncertainty: float | None = None,
-    rod_friction: float | None = None,
-) -> Group:
-    """Return an indenter as an NXcollection, with its nominal load, and a rod's friction."""
+def indenter_group(indenter: Indenter | None, of: object = _NOTHING) -> Group:
+    """Return an indenter as an NXcollection, with the load and friction that ``of`` states."""
     children: Nodes = {} if indenter is None else {"shape": indenter.shape}
     if isinstance(indenter, Profile):
         children["face"] = write_record(records.INDENTER_FACE, indenter)
     elif indenter is not None:
         round_or_cone = records.CONE if isinstance(indenter, Cone) else records.ROUND_INDENTER
         children |= write_record(round_or_cone, indenter).children
-    stated = {"load": load, "load_uncertainty": load_uncertainty, "rod_friction": rod_friction}
-    children |= write_record(records.LOAD, stated).children
+    children |= write_record(records.LOAD, of).children
     return Group("NXcollection", children)
 
 
@@ -351,15 +346,13 @@ def _shape(file: SafeFile, path: str) -> str:
     return file.text(f"{path}/shape").strip().lower()
 
 
-def instrument_group(
-    sensor: StressSensor, load_cell: LoadCell, stage: Equipment | None = None
-) -> Group:
+def instrument_group(of: _MeasuredOn) -> Group:
     """Return the NXinstrument that holds the sensor, and load cell and stage if they are stated."""
-    parts = {"stress_sensor": write_record(records.SENSOR, sensor)}
-    if load_cell != LoadCell():
-        parts["load_cell"] = write_record(records.LOAD_CELL, load_cell)
-    if stage not in (None, Equipment()):
-        parts["stage"] = write_record(records.STAGE, stage)
+    parts = {"stress_sensor": write_record(records.SENSOR, of.sensor)}
+    if of.load_cell != LoadCell():
+        parts["load_cell"] = write_record(records.LOAD_CELL, of.load_cell)
+    if of.stage != Equipment():
+        parts["stage"] = write_record(records.STAGE, of.stage)
     children = {n: replace(g, children={**g.children, **_NOWHERE}) for n, g in parts.items()}
     return Group("NXinstrument", children)
 
@@ -488,7 +481,7 @@ def assumption_group(assumptions: tuple[Assumption, ...]) -> Group:
     """Return what was taken for granted, one NXcollection each."""
     children = {}
     for assumption in assumptions:
-        declared = records.assumption_record(is_length=assumption.is_length)
+        declared = records.assumption_record(assumption.name)
         stated = {"state": assumption.state, **assumption.sizes}
         children[assumption.name] = write_record(declared, stated)
     return named_collection(children)
@@ -499,7 +492,7 @@ def read_assumptions(file: SafeFile) -> tuple[Assumption, ...]:
     path = "/entry/assumptions"
     assumptions = []
     for name in file.text_list(f"{path}/names"):
-        declared = records.assumption_record(is_length=Assumption(name, "").is_length)
+        declared = records.assumption_record(name)
         sizes = read_record(declared, file, f"{path}/{name}")
         assumptions.append(Assumption(name, sizes.pop("state"), sizes))
     return tuple(assumptions)

@@ -175,11 +175,9 @@ def _entry(scan: Scan) -> Group:
     children: Nodes = {"title": scan.title} if scan.title else {}
     children |= groups.circumstances(scan)
     children["data"] = _data_group(scan)
-    children["indenter"] = groups.indenter_group(
-        scan.indenter, scan.load, scan.load_uncertainty, scan.rod_friction
-    )
-    children["sample"] = groups.sample_group(scan.film, scan.lubrication, scan.lubricant)
-    children["instrument"] = groups.instrument_group(scan.sensor, scan.load_cell, scan.stage)
+    children["indenter"] = groups.indenter_group(scan.indenter, scan)
+    children["sample"] = groups.sample_group(scan)
+    children["instrument"] = groups.instrument_group(scan)
     if scan.notes:
         children["notes"] = writer.note(scan.notes)
     if scan.reference is not None:
@@ -195,7 +193,7 @@ def _data_group(scan: Scan) -> Group:
     forms = {"points": _POINTS, "line": (along,), "repeats": ("repeat", along)}
     axes = forms.get(scan.kind, ("y", "x"))
     data: Nodes = {"point": writer.index_axis("point", scan.x.size)} if points else {}
-    data |= _nodes(scan, {"y": scan.y}, axes if points else ("y",))
+    data |= _nodes(scan, axes if points else ("y",), y=scan.y)
     if scan.repeat is not None:
         data["repeat"] = writer.Number(scan.repeat, "1", axes)
     elif scan.kind == "repeats":
@@ -203,23 +201,23 @@ def _data_group(scan: Scan) -> Group:
     if scan.branch is not None:
         data["branch"] = writer.Number(scan.branch, "1", axes, {"meaning": _BRANCHES})
     positions = {along: scan.x, f"{along}_errors": scan.x_errors}
-    data |= _nodes(scan, positions, axes if points else (along,))
+    data |= _nodes(scan, axes if points else (along,), **positions)
     # What was at the end of the range is missing.
-    stated = {**vars(scan), "reading_high": None}
+    stated = dict(vars(scan))
     for name in ("line_offset", "position_errors_by_repeat", "at_ceiling"):
         stated[name] = stated[name] or None
     data |= write_record(records.TAKEN_FOR_GRANTED, stated).children
-    data |= _nodes(scan, {"u_zz": scan.u_zz}, axes)
+    data |= _nodes(scan, axes, u_zz=scan.u_zz)
     if scan.u_zz_correlation is not None:
         pairs = zip(_PAIRS, scan.u_zz_correlation.shape, strict=True)
         data |= {axis: writer.index_axis(axis, size) for axis, size in pairs}
-        data |= _nodes(scan, {"u_zz_correlation": scan.u_zz_correlation}, _PAIRS)
+        data |= _nodes(scan, _PAIRS, u_zz_correlation=scan.u_zz_correlation)
     like_signal = {name: getattr(scan, name) for name in LIKE_SIGNAL}
-    data |= _nodes(scan, like_signal | dict(scan.channels), axes)
+    data |= _nodes(scan, axes, **like_signal, **scan.channels)
     return Group("NXdata", data, {"signal": "u_zz", "axes": axes})
 
 
-def _nodes(scan: Scan, arrays: Mapping[str, FloatArray | None], axes: tuple[str, ...]) -> Nodes:
+def _nodes(scan: Scan, axes: tuple[str, ...], **arrays: FloatArray | None) -> Nodes:
     return {
         name: si(array, _DECLARED[name].read_in(scan.reading).dimension, axes)
         for name, array in arrays.items()

@@ -18,6 +18,7 @@ from memscal.formats.hdf5.writer import Group, Nodes, si, to_json
 from memscal.model import records
 from memscal.model.arrays import Arrays, FloatArray
 from memscal.model.checks import override_messages
+from memscal.model.instrument import Equipment
 from memscal.model.measured_stress import (
     MeasuredPoints,
     MeasuredProfile,
@@ -176,15 +177,16 @@ def _entry(measured: MeasuredStress) -> Group:
     sources = {"artifact": measured.artifact}
     for i, scan in enumerate(measured.scans, 1):
         parts: Nodes = {
-            "sample": groups.sample_group(scan.film, scan.lubrication),
+            "sample": groups.sample_group(scan),
             "indenter": groups.indenter_group(scan.indenter),
-            "instrument": groups.instrument_group(scan.sensor, scan.load_cell, scan.stage),
+            "instrument": groups.instrument_group(scan),
             **write_record(records.MEASURED_SCAN, scan).children,
         }
         scans[f"scan_{i}"] = Group("NXcollection", parts)
         sources[f"scan_{i}"] = scan.source
     inputs: Nodes = {name: write_source(s) for name, s in sources.items() if s}
-    first = measured.scans[0]
+    # Of the first scan; each states its own beside it, with its lubrication and stage.
+    first = replace(measured.scans[0], lubrication="", stage=Equipment())
     sensor = first.sensor.name
     digest = measured.artifact_digest
     digests = {"content_sha256": digest} if digest else {}
@@ -196,9 +198,8 @@ def _entry(measured: MeasuredStress) -> Group:
         "sensor": write_record(records.CONVERSION.read_in(first.reading), measured, **digests),
         "quality": groups.quality_group(measured.checks),
         "overridden": to_json(measured.overridden),
-        # Those of the first scan; each scan states its own beside them.
-        "sample": groups.sample_group(first.film),
-        "instrument": groups.instrument_group(first.sensor, first.load_cell),
+        "sample": groups.sample_group(first),
+        "instrument": groups.instrument_group(first),
         "indenter": groups.indenter_group(first.indenter),
         "scans": groups.named_collection(scans),
         "inputs": groups.named_collection(inputs),
