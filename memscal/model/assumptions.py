@@ -17,54 +17,48 @@ SIZE_KEYS = {
 }
 MOVED = tuple(SIZE_KEYS)
 
-#: By name: what is taken for granted, the word for its size, and whether that is a length.
+#: By name: what is taken for granted, and the word for its size.
 _KNOWN = {
-    "roundness": ("The sensor is round.", "axis ratio less one", False),
+    "roundness": ("The sensor is round.", "axis ratio less one"),
     "line_offset": (
         "The line passes over the sensor's centre.",
         "distance of the line from the centre",
-        True,
     ),
-    "stage_scale": ("The stage moves as far as it says.", "relative error of its scale", False),
+    "stage_scale": ("The stage moves as far as it says.", "relative error of its scale"),
     "base_slip": (
         "The film is bonded to its base.",
         "share of the difference to a base that slides freely",
-        False,
     ),
     "baseline_curvature": (
         "The baseline is straight, but for a curvature that is counted.",
         "edge to centre over the largest signal",
-        False,
     ),
     "gain_curvature": (
         "The reading is proportional to the stress.",
         "b in U (1 - b U/U_max)",
-        False,
     ),
     "shear_sensitivity": (
         "The sensor does not respond to shear.",
         "length times the divergence of the shear at the base",
-        True,
     ),
     "film_law": (
         "The film follows the law of the reference.",
         "share of the difference between a linear and a neo-Hookean film",
-        False,
     ),
     "rod_friction": (
         "The film is held, or slides, under the rod as the reference has it.",
         "share from sticking to sliding",
-        False,
     ),
     "noise_correlation": (
         "The noise of a reading is independent of its neighbours.",
         "correlation of neighbouring readings",
-        False,
     ),
-    "poisson_ratio": ("Poisson's ratio is as stated.", "error of Poisson's ratio", False),
-    "thickness": ("The film is as thick as stated.", "error of the thickness", True),
-    "load_scale": ("The load is as stated.", "relative error of the load", False),
+    "poisson_ratio": ("Poisson's ratio is as stated.", "error of Poisson's ratio"),
+    "thickness": ("The film is as thick as stated.", "error of the thickness"),
+    "load_scale": ("The load is as stated.", "relative error of the load"),
 }
+#: Those whose size is a length.
+LENGTHS = ("line_offset", "shear_sensitivity", "thickness")
 NAMES = tuple(_KNOWN)
 
 
@@ -117,11 +111,11 @@ class Assumption:
     @property
     def is_length(self) -> bool:
         """Whether the size is a length."""
-        return self._known[2]
+        return self.name in LENGTHS
 
     @property
-    def _known(self) -> tuple[str, str, bool]:
-        return _KNOWN.get(self.name, ("", "", False))
+    def _known(self) -> tuple[str, str]:
+        return _KNOWN.get(self.name, ("", ""))
 
     @property
     def unit(self) -> str:

@@ -173,7 +173,7 @@ def along(axes: tuple[str, ...], *quantities: Quantity) -> list[Quantity]:
     return [replace(quantity, axes=axes) for quantity in quantities]
 
 
-def measured(quantity: Quantity, *, required: bool = False) -> tuple[Quantity, Quantity]:
+def measured(quantity: Quantity) -> tuple[Quantity, Quantity]:
     """Return a number and its standard uncertainty, ``NAME_errors`` in files."""
     spread = replace(
         quantity,
@@ -181,7 +181,7 @@ def measured(quantity: Quantity, *, required: bool = False) -> tuple[Quantity, Q
         stored=f"{quantity.key}_errors",
         words=f"standard uncertainty of the {quantity.words}",
         symbol="",
-        required=required,
+        required=False,
         label=f"u({quantity.label or quantity.name})",
     )
     return quantity, spread

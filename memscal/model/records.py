@@ -2,12 +2,11 @@
 
 from dataclasses import replace
 
-from memscal.model.assumptions import SIZE_KEYS
+from memscal.model.assumptions import LENGTHS, SIZE_KEYS
 from memscal.model.quantities import ESTIMATED, Quantity, Record, along, measured, record, required
 from memscal.model.scan import STATED_ERRORS
 
 _L = "length"
-_LENGTHS = ("line_offset", "shear_sensitivity")
 #: What a scan states an uncertainty of that is one, and not none, where all is as it should be.
 _FACTORS = ("position_scale", "gain")
 _P = "stress"
@@ -20,7 +19,6 @@ _OF_G = "standard uncertainty of G, with detail that the film hides"
 _R = ("r",)
 _X = ("x",)
 _YX = ("y", "x")
-_K = ("k",)
 
 # The second axis of a covariance has a name of its own: netCDF tools want each dimension once.
 _RR = ("r", "r_prime")
@@ -97,10 +95,7 @@ USER = record(
 )
 CONVERSION = record(
     "NXcollection",
-    *measured(
-        Quantity("conversion_constant", _A, "conversion constant", "A", required=True),
-        required=True,
-    ),
+    *required(*measured(Quantity("conversion_constant", _A, "conversion constant", "A"))),
 )
 
 TIMES = record(
@@ -145,7 +140,7 @@ TAKEN_FOR_GRANTED = record(
     *(
         Quantity(
             f"{name}_uncertainty",
-            _L if name in _LENGTHS else _ONE,
+            _L if name in LENGTHS else _ONE,
             stored=f"{name}_errors",
             of=float(name in _FACTORS),
         )
@@ -260,10 +255,13 @@ RADIAL_VERSION_1_0 = record("NXdata", *_G[:4], *_COVARIANCE[1:], _G[4], signal="
 TRANSFER = record(
     "NXdata",
     *required(
-        Quantity("k", _W, "wavenumber", "k", _K),
-        Quantity("modulus", _ONE, "modulus of the transfer function", "|Ĝ|", _K),
-        Quantity("modulus_errors", _ONE, "standard uncertainty of |Ĝ|", axes=_K),
-        Quantity("window", _ONE, "window of the regularisation", axes=_K),
+        *along(
+            ("k",),
+            Quantity("k", _W, "wavenumber", "k"),
+            Quantity("modulus", _ONE, "modulus of the transfer function", "|Ĝ|"),
+            Quantity("modulus_errors", _ONE, "standard uncertainty of |Ĝ|"),
+            Quantity("window", _ONE, "window of the regularisation"),
+        ),
         Quantity("resolved_wavenumber", _W, "resolved up to the wavenumber", "k"),
     ),
     signal="modulus",
@@ -300,12 +298,12 @@ CHECK = record(
 )
 
 
-def assumption_record(*, is_length: bool) -> Record:
+def assumption_record(name: str) -> Record:
     """Return the record of the sizes at which an assumption moves each parameter by one u."""
-    dimension = _L if is_length else _ONE
+    dimension = _L if name in LENGTHS else _ONE
     sizes = (
-        Quantity(name, dimension, f"size for u({ESTIMATED[name].symbol})", stored=key)
-        for name, key in SIZE_KEYS.items()
+        Quantity(moved, dimension, f"size for u({ESTIMATED[moved].symbol})", stored=key)
+        for moved, key in SIZE_KEYS.items()
     )
     state = Quantity("state", "text", "assumed, stated or measured", required=True)
     return record("NXcollection", state, *required(*sizes))
@@ -353,9 +351,9 @@ STRESS_NUMBERS = record(
     _LUBRICATION,
     *_TOTAL_FORCE,
     *measured(Quantity("maximum", _P, "maximum of S_zz", "S", required=True)),
-    *measured(Quantity("centre", _L, "centre", "x₀", required=True), required=True),
+    *required(*measured(Quantity("centre", _L, "centre", "x₀"))),
     *measured(Quantity("centre_y", _L, "centre along y", "y₀")),
-    *measured(Quantity("baseline", _U, "baseline", "U₀", required=True), required=True),
+    *required(*measured(Quantity("baseline", _U, "baseline", "U₀"))),
     Quantity("contact_radius", _L, "contact radius", "a", required=True),
 )
 STRESS_CURVE = record(
@@ -372,21 +370,8 @@ MEASURED_SCAN = record(
         Quantity("width", _L, "extent of the positions"),
         Quantity("synthetic", "truth", "whether the scan is synthetic"),
     ),
-    Quantity(
-        "position_scale_uncertainty",
-        _ONE,
-        "relative uncertainty of all positions",
-        stored="position_scale_errors",
-        of=1.0,
-    ),
-    Quantity(
-        "gain_uncertainty",
-        _ONE,
-        "relative uncertainty of all readings",
-        stored="gain_errors",
-        of=1.0,
-    ),
-    Quantity("position_errors_by_repeat", "truth", "whether x_errors are new in each repeat"),
+    *TAKEN_FOR_GRANTED.quantities[1:3],  # scale of the positions, and gain
+    TAKEN_FOR_GRANTED.quantities[-3],  # whether errors of positions are new in each repeat
     Quantity("unit", "text", "unit of readings that are no voltages"),
 )
 
