@@ -7,6 +7,7 @@ import click
 from memscal.cli.failures import debug_option
 from memscal.cli.options import json_option
 from memscal.cli.output import emit_json, emit_tables
+from memscal.model.checks import EXPLANATIONS
 from memscal.summaries.table import Table
 
 EXAMPLES = """\b
@@ -27,8 +28,6 @@ def command(check: str | None, as_json: bool) -> None:
     Names are those of the tables, with blanks or underscores; a profile's number makes no
     difference.
     """
-    from memscal.model.checks import EXPLANATIONS
-
     names = list(EXPLANATIONS) if check is None else [_kind(check)]
     if as_json:
         checks = []
@@ -48,8 +47,6 @@ def command(check: str | None, as_json: bool) -> None:
 def _kind(check: str) -> str:
     """Return the kind of a check, or refuse a name that no check has."""
     from difflib import get_close_matches
-
-    from memscal.model.checks import EXPLANATIONS
 
     name = re.sub(r"\W+", "_", check.strip().lower())
     # A number is that of a profile; joint_chi_square_dry is of a kind of loads.

@@ -85,19 +85,6 @@ extra tables: pip install "memscal[tables]"; TDMS needs the extra recorded.
 Meshes (.vtu, .vtk, .xdmf) need the extra fem-io: pip install "memscal[fem-io]".
 """
 
-_COLUMNS = (
-    "x",
-    "y",
-    "u",
-    "u_errors",
-    "u_xz",
-    "u_yz",
-    "load_column",
-    "depth",
-    "repeat",
-    "branch",
-    "time",
-)
 _OF_HOLDS = ("depth_unit", "baseline")
 _MADE = ("speed", "step")
 _CELL_NAMES = {"name": "load_cell", "serial_number": "load_cell_serial"}
@@ -398,7 +385,7 @@ def _set_up(options: Options) -> dict[str, Any]:
 
 
 def _read_scan(path: Path, options: Options) -> ImportedScan:
-    from memscal.formats.tables.scan import import_table, records_of
+    from memscal.formats.tables.scan import ARRAYS, import_table, records_of
     from memscal.model.instrument import LoadCell, StressSensor
 
     sensor = {field: options[option] for field, option in _SENSOR_NAMES.items()}
@@ -407,4 +394,5 @@ def _read_scan(path: Path, options: Options) -> ImportedScan:
     stated["sensor"] = StressSensor(**_stated(sensor, _SENSOR_NAMES))
     stated["load_cell"] = LoadCell(**_stated(load_cell, _CELL_NAMES))
     stated["x_error"] = options["position_error"]
-    return import_table(path, **_stated(options, _COLUMNS), **records_of(stated))
+    columns = _stated(options, ("x", "u", *ARRAYS))
+    return import_table(path, **columns, **records_of(stated))

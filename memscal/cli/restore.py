@@ -1,11 +1,9 @@
 """``memscal restore``: a scan and a calibrated sensor to the stress at the base of the film."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
@@ -21,9 +19,7 @@ from memscal.cli.options import (
     report_options,
     trust_options,
 )
-
-if TYPE_CHECKING:
-    from memscal.measurement.restoration import Restoration
+from memscal.errors import MemscalError
 
 EXAMPLES = """\b
 Examples:
@@ -62,6 +58,7 @@ def command(artifact: Path, scan: Path, **options: Any) -> int:
     from memscal.formats.reference import read_reference, write_reference
     from memscal.formats.scan import read_scan
     from memscal.measurement.restore import restore
+    from memscal.mechanics.press_rod import press_rod
 
     output = options["output"]
     expected = options["expected"]
@@ -75,19 +72,10 @@ def command(artifact: Path, scan: Path, **options: Any) -> int:
         settings = {name: options[name] for name in ("load", "override")}
         restored = restore(data, apparatus, expected=stress, **settings)
         if stress is None:
-            restored = _with_contact(restored)
+            try:
+                contact = press_rod(*restored.scan.set_up)
+                restored = replace(restored, comparison=restored.compare(contact))
+            except MemscalError as failure:
+                out.note(f"No contact is shown beside the result: {failure.problem}")
     out.deliver(restored, output, partial(write_reference, restored.profile()), options)
     return exit_code_of(restored.checks)
-
-
-def _with_contact(restored: Restoration) -> Restoration:
-    """Compare with the calculated contact, to show it; one that has no solution is left out."""
-    from memscal.errors import MemscalError
-    from memscal.mechanics.press_rod import press_rod
-
-    try:
-        contact = press_rod(*restored.scan.set_up)
-        return replace(restored, comparison=restored.compare(contact))
-    except MemscalError as failure:
-        out.note(f"No contact is shown beside the result: {failure.problem}")
-        return restored

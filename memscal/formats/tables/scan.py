@@ -54,7 +54,7 @@ _RECORDS = {
 #: What of a layout is for who opens the table.
 _READING = ("sheet", "scan", "skip_rows", "missing", "delimiter", "decimal")
 #: Options that name columns, besides x and u.
-_ARRAYS = ("y", "repeat", "branch", "u_errors", "load_column", "depth", "u_xz", "u_yz", "time")
+ARRAYS = ("y", "repeat", "branch", "u_errors", "load_column", "depth", "u_xz", "u_yz", "time")
 #: Words of a column that tells when the indenter presses.
 _PRESSING = {"false": 0.0, "true": 1.0}
 #: Positions closer than this share of the typical spacing are probably one place, and a table with
@@ -231,7 +231,7 @@ def import_table(
 def scan_of_arrays(x: ArrayLike, u: ArrayLike, **options: Any) -> ImportedScan:
     """Return a scan of arrays like ``u``, of which some options are; a row of ``u`` is a pass."""
     readings = frozen_array(u)
-    given = {name: options.pop(name) for name in _ARRAYS if options.get(name) is not None}
+    given = {name: options.pop(name) for name in ARRAYS if options.get(name) is not None}
     if readings.ndim == 2 and not given.keys() & {"y", "repeat"}:
         given["repeat"] = np.arange(len(readings))[:, None]
     columns = {"u": readings, "x": x, **given}
