@@ -461,6 +461,8 @@ def shared_changes(
 def input_changes(apparatus: ApparatusFunction, names: Iterable[str], k: FloatArray) -> Arrays:
     """Return changes (n,) of the transform of A G, in V/Pa, by inputs of the calibration."""
     known = tuple(name for name in names if name in apparatus.kernel_changes)
+    if not known:
+        return {}
     changes = _kernel_changes(apparatus, k.tobytes(), known)
     return dict(zip(known, changes, strict=True))
 
@@ -470,8 +472,6 @@ def _kernel_changes(
     apparatus: ApparatusFunction, nodes: bytes, names: tuple[str, ...]
 ) -> FloatArray:
     """Transforms (q, n) of changes of A G by inputs, which all profiles of one sensor share."""
-    if not names:
-        return np.empty((0, len(nodes) // 8))
     table = np.column_stack([apparatus.kernel_changes[name] for name in names])
     transforms = hankel_transform(apparatus.radial_profile.r, table, np.frombuffer(nodes))
     return apparatus.conversion_constant * transforms.T

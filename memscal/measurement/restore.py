@@ -24,7 +24,7 @@ from memscal.estimation.set_up import accepted_differences, file_in_words, state
 from memscal.formats.opened import opened_scan
 from memscal.formats.reference import read_reference
 from memscal.measurement.posterior import film_transfer, posterior_of, reach_of, sensor_changes
-from memscal.measurement.restoration import SAME_LOAD, Expected, Restoration, StressComparison
+from memscal.measurement.restoration import SAME_LOAD, Expected, Restoration
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import (
     FAILED_CALIBRATION,
@@ -249,8 +249,19 @@ def _checks(restored: Restoration) -> Iterator[QualityCheck]:
     yield from _noise(restored)
     yield _symmetry(restored)
     yield outlier_check(restored.posterior.estimate.outlier_weight, "the residuals")
-    if restored.comparison is not None:
-        yield _expected(restored.comparison)
+    compared = restored.comparison
+    if compared is not None:
+        yield check(
+            "expected_stress",
+            compared.chi_square,
+            compared.limit,
+            "Reduced chi-square of the scan against the expected stress blurred by A G, whose "
+            "uncertainty counts, with centre and baseline fitted. The restored stress differs from "
+            f"the expected one by up to {compared.difference:.1%} of the largest, and agrees "
+            f"within 95 % bounds at {compared.within:.0%} of the radii. A failure means that the "
+            "contact is not as it was calculated: friction, shape, film, or load.",
+            compared.p_value,
+        )
 
 
 def force_less_load(
@@ -297,20 +308,6 @@ def _symmetry(restored: Restoration) -> QualityCheck:
         )
     return added_check(
         name, uneven.fall, uneven.count, f"Fall of chi-square by {uneven.count} {meaning}"
-    )
-
-
-def _expected(compared: StressComparison) -> QualityCheck:
-    return check(
-        "expected_stress",
-        compared.chi_square,
-        compared.limit,
-        "Reduced chi-square of the scan against the expected stress blurred by A G, whose "
-        "uncertainty counts, with centre and baseline fitted. The restored stress differs from the "
-        f"expected one by up to {compared.difference:.1%} of the largest, and agrees within 95 % "
-        f"bounds at {compared.within:.0%} of the radii. A failure means that the contact is not as "
-        "it was calculated: friction, shape, film, or load.",
-        compared.p_value,
     )
 
 
@@ -424,12 +421,11 @@ def restore_known(
 ) -> Restoration:
     """Restore a stress from a scan and an apparatus function that were checked to fit together."""
     # ``start``: the pressure of nearly the same voltages.
-    points = measured_points(scan)
-    estimate, transfer = gaussian_pressure(scan, apparatus, points, start)
+    estimate, transfer = gaussian_pressure(scan, apparatus, start)
     posterior = posterior_of(scan, apparatus, estimate, transfer)
     nodes = posterior.nodes
     # From the axis to half the scan's width.
-    r = np.linspace(0.0, reach_of(points) / 3, 161)
+    r = np.linspace(0.0, reach_of(estimate.points) / 3, 161)
     matrix = posterior.wavenumbers.synthesise(np.eye(nodes), r)
     restored = Restoration(
         scan=scan,
@@ -446,12 +442,10 @@ def restore_known(
 
 
 def gaussian_pressure(
-    scan: Scan,
-    apparatus: ApparatusFunction,
-    points: ScanPoints,
-    start: ProfileEstimate | None = None,
+    scan: Scan, apparatus: ApparatusFunction, start: ProfileEstimate | None = None
 ) -> tuple[ProfileEstimate, FloatArray]:
     """Return the best Gaussian pressure on the film, with departures, and A G's transform."""
+    points = measured_points(scan)
     through, transfer = unit_force(scan, apparatus, points)
     with undetermined():
         return estimate_profile(points, through, start=start), transfer
