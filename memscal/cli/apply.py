@@ -41,15 +41,13 @@ def command(artifact: Path, scans: tuple[Path, ...], **options: Any) -> int:
 
     A failed quality check is exit code 1: the result is written all the same.
     """
-    from memscal.formats.opened import opened_scans
     from memscal.measurement.measure_stress import measure_stress
 
-    accepted = {name: options[name] for name in ("override", "accept_altered")}
-    data = opened_scans(scans, accept_altered=accepted["accept_altered"])
     written = options["output"] or out.default_name(scans[0], ".stress.h5")
     outputs = [written, *options["figures"], options["report"]]
     out.prove_writable(outputs, force=options["force"], inputs=[artifact, *scans])
     with out.working("Measuring"):
-        stress = measure_stress(data, artifact, **accepted)
+        accepted = {name: options[name] for name in ("override", "accept_altered")}
+        stress = measure_stress(scans, artifact, **accepted)
     out.deliver(stress, written, stress.save, options)
     return exit_code_of(stress.checks)

@@ -68,7 +68,7 @@ def _chosen_method(
     from memscal.errors import InputError
 
     method = method or ("white-noise" if channel == "zz" else "bayesian")
-    values = dict(_option(text) for text in options)
+    values = dict(map(_option, options))
     if "seed" in values:
         raise click.UsageError("Give the seed as --seed, not as --option.")
     try:
@@ -210,7 +210,7 @@ def calibration_settings(
     accepted = others["accept_altered"]
     return {
         "method": _chosen_method(method, options, seed, others["channel"]),
-        "correlations": dict(_correlation(text) for text in correlations),
+        "correlations": dict(map(_correlation, correlations)),
         "reference": reference and _read_reference(reference, pixel_size, accepted),
         "alternative": alternative and _read_reference(alternative, None, accepted),
         "seed": seed or 0,
@@ -315,15 +315,12 @@ def command(
 
 
 def _read(paths: tuple[Path, ...], reference: Path | None, settings: Options) -> list[Scan]:
-    from memscal.estimation.set_up import require_calibration_rod
     from memscal.formats.opened import opened_scans
     from memscal.model.sizes import MOST_OF_LINES
 
-    profile = settings["reference"]
     accepted = settings["accept_altered"]
     scans = list(opened_scans(paths, MOST_OF_LINES, accept_altered=accepted))
     for scan, path in zip(scans, paths, strict=True):
-        require_calibration_rod(scan, profile)
         if reference is not None and scan.reference is not None:
             out.note(f"{reference.name} is used in place of the reference in {path.name}.")
     return scans

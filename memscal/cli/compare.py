@@ -163,7 +163,6 @@ def command(
     _require_channel(apparatus, artifact, channel)
     data = opened_contacts(scans, **accepted)
     references = [read_reference(path, **accepted) for path in options["references"]]
-    shear = options["shear"] and load_apparatus(options["shear"], **accepted)
     page_figures = options["figures"]
     report = options["report"]
     folder = options["folder"]
@@ -182,7 +181,6 @@ def command(
             friction=sorted({0.0, *friction, math.inf}) if friction else None,
             loading=options["loadings"] or ("incremental", "total"),
             references=references or None,
-            shear=shear,
             cache=cache,
             workers=min(2, os.cpu_count() or 1),
             **settings,
@@ -246,7 +244,9 @@ _SETTINGS = (
     "macroscopic",
     "macroscopic_uncertainty",
     "interface",
+    "shear",
     "override",
+    "accept_altered",
 )
 #: Options that the comparison of a shear does not have, and how they are typed.
 _NORMAL_STRESS_ONLY = {

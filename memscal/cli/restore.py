@@ -54,24 +54,21 @@ def command(artifact: Path, scan: Path, **options: Any) -> int:
 
     A failed quality check is exit code 1: the result is written all the same.
     """
-    from memscal.apparatus import load_apparatus
-    from memscal.formats.reference import read_reference, write_reference
-    from memscal.formats.scan import read_scan
+    from memscal.formats.reference import write_reference
     from memscal.measurement.restore import restore
     from memscal.mechanics.press_rod import press_rod
 
     output = options["output"]
-    expected = options["expected"]
-    accepted = {"accept_altered": options["accept_altered"]}
-    apparatus = load_apparatus(artifact, **accepted)
-    data = read_scan(scan, **accepted)
-    stress = None if expected is None else read_reference(expected, **accepted)
     outputs = [output, *options["figures"], options["report"]]
-    out.prove_writable(outputs, force=options["force"], inputs=[artifact, scan, expected])
+    out.prove_writable(
+        outputs, force=options["force"], inputs=[artifact, scan, options["expected"]]
+    )
     with out.working("Restoring"):
-        settings = {name: options[name] for name in ("load", "override")}
-        restored = restore(data, apparatus, expected=stress, **settings)
-        if stress is None:
+        settings = {
+            name: options[name] for name in ("expected", "load", "override", "accept_altered")
+        }
+        restored = restore(scan, artifact, **settings)
+        if settings["expected"] is None:
             try:
                 contact = press_rod(*restored.scan.set_up)
                 restored = replace(restored, comparison=restored.compare(contact))
