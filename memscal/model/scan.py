@@ -59,27 +59,6 @@ BRANCHES = {"approach": 1, "retreat": 2}
 LINE = 0.01
 
 
-def require_contacts(scan: Scan) -> None:
-    """Refuse uncertainties of loads that are none, and an unknown state of lubrication."""
-    if scan.normal_load_errors is not None and scan.normal_load is None:
-        raise InputError(
-            "normal_load_errors is given without normal_load.",
-            why="It is the standard uncertainty of the load at each point.",
-            cure="Give normal_load too, the load that was set at each point.",
-        )
-    if scan.lubrication not in LUBRICATIONS:
-        raise InputError(
-            f"The lubrication of the scan is {scan.lubrication!r}.",
-            cure="Give 'dry' or 'lubricated', or leave it out.",
-        )
-    if scan.lubricant and scan.lubrication != "lubricated":
-        stated = scan.lubrication or "not stated"
-        raise InputError(
-            f"The scan names a lubricant, {scan.lubricant!r}, but its lubrication is {stated}.",
-            cure="Give the lubrication 'lubricated', or leave the lubricant out.",
-        )
-
-
 def require_rod_friction(friction: float | None) -> None:
     """Refuse a friction of the rod that no film of rubber is solved with."""
     if friction not in (None, 0.0, math.inf):
@@ -106,20 +85,6 @@ def branch_numbers(name: str, stated: ArrayLike) -> NDArray[np.int64]:
             cure="Give 1 or 'approach', 2 or 'retreat', and 0 where it is not known.",
         )
     return numbers.astype(np.int64)
-
-
-def require_plane(x: FloatArray, y: FloatArray) -> None:
-    """Refuse points of a plane that lie along a line: their centre across it is not determined."""
-    spread = np.ptp(x), np.ptp(y)
-    thin = np.argmin(spread)
-    if spread[thin] <= LINE * spread[1 - thin]:
-        raise InputError(
-            f"The points spread over {spread[0] * 1e3:.4g} mm along x and {spread[1] * 1e3:.4g} mm "
-            "along y.",
-            why=f"With less than {LINE:.0%} of the one along the other they are a line: the "
-            "centre across it is not determined.",
-            cure="Leave y out." if thin else "Give the positions along y as x; direction='y'.",
-        )
 
 
 #: Loads farther apart than this share are not one load that scatters; fewer readings are no line.
@@ -306,7 +271,6 @@ class Scan:
         self._freeze_readings()
         self._check_values()
         self._check_set_up()
-        require_contacts(self)
         warn_of_units(self.film, self.indenter)
         if self.u_zz_correlation is not None:
             points = self.u_zz.size if self.planar else self.x.size
@@ -467,7 +431,18 @@ class Scan:
                 why="It numbers the pass of each point; rows of a u_zz of two axes are passes.",
             )
         if self.kind == "points" and self.y is not None:
-            require_plane(self.x, self.y)
+            spread = np.ptp(self.x), np.ptp(self.y)
+            thin = np.argmin(spread)
+            if spread[thin] <= LINE * spread[1 - thin]:
+                raise InputError(
+                    f"The points spread over {spread[0] * 1e3:.4g} mm along x and "
+                    f"{spread[1] * 1e3:.4g} mm along y.",
+                    why=f"With less than {LINE:.0%} of the one along the other they are a line: "
+                    "the centre across it is not determined.",
+                    cure="Leave y out."
+                    if thin
+                    else "Give the positions along y as x; direction='y'.",
+                )
 
     def _freeze_readings(self) -> None:
         require_size("u_zz of the scan", self.u_zz)
@@ -530,6 +505,23 @@ class Scan:
             )
         require_rod_friction(self.rod_friction)
         require_non_negative("standard uncertainty of the load", self.load_uncertainty)
+        if self.normal_load_errors is not None and self.normal_load is None:
+            raise InputError(
+                "normal_load_errors is given without normal_load.",
+                why="It is the standard uncertainty of the load at each point.",
+                cure="Give normal_load too, the load that was set at each point.",
+            )
+        if self.lubrication not in LUBRICATIONS:
+            raise InputError(
+                f"The lubrication of the scan is {self.lubrication!r}.",
+                cure="Give 'dry' or 'lubricated', or leave it out.",
+            )
+        if self.lubricant and self.lubrication != "lubricated":
+            stated = self.lubrication or "not stated"
+            raise InputError(
+                f"The scan names a lubricant, {self.lubricant!r}, but its lubrication is {stated}.",
+                cure="Give the lubrication 'lubricated', or leave the lubricant out.",
+            )
         if self.load is None:
             return
         if not 0 < self.load < math.inf:
