@@ -3,17 +3,11 @@
 from collections.abc import Sequence
 
 from memscal.cli.commands import memscal
-from memscal.cli.failures import Session, guarded
+from memscal.cli.failures import guarded
 from memscal.parallel import one_thread_per_process
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command ``memscal`` and return its exit code, as ``memscal --help`` lists them."""
-
-    def run(session: Session) -> int:
-        args = None if arguments is None else list(arguments)
-        code = memscal.main(args, prog_name="memscal", standalone_mode=False, obj=session)
-        return code if isinstance(code, int) else 0
-
     one_thread_per_process()
-    return guarded(run)
+    return guarded(memscal, arguments)

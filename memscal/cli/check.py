@@ -31,8 +31,14 @@ def command(file: Path, as_json: bool) -> int:
     findings = check(file)
     passed = all(finding.passed for finding in findings)
     if as_json:
-        head = {"schema_version": "1", "file": str(file), "passed": passed}
-        emit_json({**head, "findings": [vars(finding) for finding in findings]})
+        emit_json(
+            {
+                "schema_version": "1",
+                "file": str(file),
+                "passed": passed,
+                "findings": [vars(finding) for finding in findings],
+            }
+        )
     else:
         rows = [(f.name, "passed" if f.passed else "FAILED", f.meaning) for f in findings]
         failed = frozenset(i for i, f in enumerate(findings) if not f.passed)

@@ -98,7 +98,7 @@ def _interruptible() -> Iterator[list[int]]:
             signal.signal(number, handler)
 
 
-def guarded(run: Callable[[Session], int]) -> int:
+def guarded(command: click.Command, arguments: Sequence[str] | None) -> int:
     """Run a command; return its exit code, or that of its failure after saying what it was."""
     session = Session()
     came = []
@@ -106,7 +106,10 @@ def guarded(run: Callable[[Session], int]) -> int:
         warnings.showwarning = _show_warning
         try:
             with _interruptible() as came:
-                return run(session)
+                code = command.main(
+                    arguments, prog_name="memscal", standalone_mode=False, obj=session
+                )
+                return code if isinstance(code, int) else DONE
         except click.UsageError as failure:
             failure.show()
             return USAGE

@@ -12,6 +12,7 @@ from memscal.cli import output as out
 from memscal.cli.options import (
     FILE,
     FILM,
+    FILM_NUMBERS,
     FREE_OR_STUCK,
     LAW,
     POSITION,
@@ -85,8 +86,6 @@ extra tables: pip install "memscal[tables]"; TDMS needs the extra recorded.
 Meshes (.vtu, .vtk, .xdmf) need the extra fem-io: pip install "memscal[fem-io]".
 """
 
-_OF_HOLDS = ("depth_unit", "baseline")
-_MADE = ("speed", "step")
 _CELL_NAMES = {"name": "load_cell", "serial_number": "load_cell_serial"}
 _SENSOR_NAMES = {"name": "sensor_name", "model": "sensor_model", "channel": "channel"}
 _SIGNS = ("u_sign", "sign", "shear_sign")
@@ -96,8 +95,7 @@ _OF_BOTH = (
     "indenter",
     "radius",
     "radius_uncertainty",
-    *FILM,
-    *(f"{name}_uncertainty" for name in FILM),
+    *FILM_NUMBERS,
     *LAW,
     *_READING,
 )
@@ -332,7 +330,7 @@ def _check_usage(path: Path, kind: str, mesh: bool, options: Options) -> None:
         needed += _NEEDED_WITH_MESH if mesh else _TABLE_ONLY
     elif not _stated(options, ("x", "u")) and hook("kind_of_record")(path) == "HDF5 file":
         needed = []  # but what it plots
-    elif _stated(options, ("y", "time", *_MADE)):
+    elif _stated(options, ("y", "time", "speed", "step")):
         needed.remove("x")  # the library knows what they need, and says it
     missing = [name for name in needed if options[name] is None]
     if missing:
@@ -351,7 +349,7 @@ def _check_usage(path: Path, kind: str, mesh: bool, options: Options) -> None:
         raise click.UsageError("Give --load, or --value in its place.")
     if options["rod_friction"] is not None and options["indenter"] == "sphere":
         raise click.UsageError("--rod-friction belongs to --indenter rod.")
-    of_holds = _stated(options, ("depth", *_OF_HOLDS, "figure"))
+    of_holds = _stated(options, ("depth", "depth_unit", "baseline", "figure"))
     if of_holds and options["holds"] is None:
         raise click.UsageError(f"{named(of_holds)} belong to --holds.")
     if not mesh and options["shear_sign"] is not None and options["shear"] is None:

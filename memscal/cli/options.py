@@ -157,8 +157,9 @@ out_option = option("-o --output", FILE, metavar="OUT")
 
 def figure_option(about: str) -> _Adder:
     """Return the option of a figure's files; the text says what is drawn."""
-    adder = option("--figure figures", FigurePath(), multiple=True, metavar="FILE.png|svg|pdf")
-    return adder(f"{about} May be repeated.")
+    return option("--figure figures", FigurePath(), multiple=True, metavar="FILE.png|svg|pdf")(
+        f"{about} May be repeated."
+    )
 
 
 def laboratory_option(subject: str) -> _Adder:
@@ -207,6 +208,8 @@ report_options = options_of(brief_option, report_option, output_options)
 FILM_LAWS = ("linear", "neo-hookean", "mooney-rivlin")
 FILM = ("young_modulus", "poisson_ratio", "thickness")
 """What describes a film, by the names of its options."""
+FILM_NUMBERS = (*FILM, *(f"{name}_uncertainty" for name in FILM))
+"""The same with their uncertainties."""
 LAW = ("film_law", "mooney_rivlin_ratio")
 """What describes its law."""
 
@@ -233,20 +236,29 @@ _UNCERTAINTY = "Standard uncertainty (k = 1) of "
 
 def film_options(*, defaults: Defaults = _NO_DEFAULTS, uncertainties: bool = True) -> _Adder:
     """Return the film's options, with or without those of the uncertainties."""
-    ratio = NonNegative("ratio", high=0.5)
-    modulus_text = "Young's modulus of the film, in MPa."
-    ratio_text = "Poisson's ratio of the film, from 0 to 0.5 (incompressible)."
     entries = (
-        ("young-modulus", Quantity("MPa"), modulus_text, "Young's modulus, in MPa."),
-        ("poisson-ratio", ratio, ratio_text, "Poisson's ratio."),
+        (
+            "young-modulus",
+            Quantity("MPa"),
+            "Young's modulus of the film, in MPa.",
+            "Young's modulus, in MPa.",
+        ),
+        (
+            "poisson-ratio",
+            NonNegative("ratio", high=0.5),
+            "Poisson's ratio of the film, from 0 to 0.5 (incompressible).",
+            "Poisson's ratio.",
+        ),
         ("thickness", Quantity("mm"), "Thickness of the film, in mm.", "the thickness, in mm."),
     )
-    law = option("--film-law", click.Choice(FILM_LAWS), defaults.get("film-law"))
-    constants = option("--mooney-rivlin-ratio", NonNegative("ratio"))
     return options_of(
         _measured(entries, defaults, uncertainties),
-        law("Law of the film's stress: small strain, or rubber."),
-        constants("C2/C1 of a film of --film-law mooney-rivlin."),
+        option("--film-law", click.Choice(FILM_LAWS), defaults.get("film-law"))(
+            "Law of the film's stress: small strain, or rubber."
+        ),
+        option("--mooney-rivlin-ratio", NonNegative("ratio"))(
+            "C2/C1 of a film of --film-law mooney-rivlin."
+        ),
     )
 
 
@@ -296,8 +308,7 @@ def film_from(options: Options, otherwise: str = "") -> ElasticFilm:
         )
     from memscal.model.film import ElasticFilm
 
-    names = [*FILM, *(f"{name}_uncertainty" for name in FILM)]
-    numbers: Options = {name: options.get(name) for name in names}
+    numbers: Options = {name: options.get(name) for name in FILM_NUMBERS}
     return ElasticFilm(law=law, mooney_rivlin_ratio=ratio, **numbers)
 
 

@@ -247,9 +247,13 @@ def chi_square_limit(degrees: float) -> float:
 
 def failed_check_messages(checks: Iterable[QualityCheck]) -> list[Message]:
     """Return a warning for each check that failed, in their order."""
-    failed = "Quality check {0.name} failed: {0.value:.3g} exceeds {0.limit:.3g}. {0.meaning}"
     return [
-        Message(FAILED_CHECK, failed.format(check), "warning")
+        Message(
+            FAILED_CHECK,
+            f"Quality check {check.name} failed: {check.value:.3g} exceeds {check.limit:.3g}. "
+            f"{check.meaning}",
+            "warning",
+        )
         for check in checks
         if not check.passed
     ]
