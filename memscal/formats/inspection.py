@@ -1,7 +1,6 @@
 """Contents of a file, and its checks step by step: for ``memscal inspect`` and ``check``."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -18,7 +17,7 @@ from memscal.formats.scan import scan_from
 from memscal.formats.stress import profile_paths, stress_from
 from memscal.formats.units import dimension_of, to_si
 from memscal.model import records
-from memscal.model.arrays import Values
+from memscal.model.arrays import Values, value_record
 from memscal.model.quantities import Record, estimated_quantity, record
 
 _READERS: dict[str, Callable[[SafeFile], Any]] = {
@@ -79,7 +78,7 @@ _LAYOUTS: dict[str, dict[str, Record]] = {
 }
 
 
-@dataclass(frozen=True)
+@value_record
 class Finding:
     """One finding about a file: what was looked at, whether it is in order, and what it means."""
 
@@ -94,12 +93,6 @@ def describe(path: FilePath, *, accept_altered: bool = False) -> Values:
         schema = _schema(file)
         version = require_schema(file, schema)
         _READERS[schema](file)
-        content: Values = {"file": file.name, "sha256": file.source.sha256}
-        if file.source.altered:
-            content["altered"] = file.source.altered
-        content["schema"] = schema
-        content["schema_version"] = version
-        content["title"] = file.optional_text("/entry/title")
         quantities = []
         arrays = []
         provenance = []
@@ -114,9 +107,7 @@ def describe(path: FilePath, *, accept_altered: bool = False) -> Values:
                     quantities.append(_quantity_row(file, place))
                 elif quantity.of is not None and value not in [q["path"] for q in quantities]:
                     quantities.append(_quantity_row(file, value if file.has(value) else place))
-        content["quantities"] = quantities
-        content["arrays"] = arrays
-        content["checks"] = [
+        checks = [
             {
                 "name": check.name,
                 "value": _plain(check.value),
@@ -126,8 +117,19 @@ def describe(path: FilePath, *, accept_altered: bool = False) -> Values:
             }
             for check in read_quality(file)
         ]
-        content["provenance"] = origins(file, provenance)
-        return content
+        altered = file.source.altered
+        return {
+            "file": file.name,
+            "sha256": file.source.sha256,
+            **({"altered": altered} if altered else {}),
+            "schema": schema,
+            "schema_version": version,
+            "title": file.optional_text("/entry/title"),
+            "quantities": quantities,
+            "arrays": arrays,
+            "checks": checks,
+            "provenance": origins(file, provenance),
+        }
 
 
 def check(path: FilePath) -> list[Finding]:

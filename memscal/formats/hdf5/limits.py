@@ -27,16 +27,9 @@ _MAX_BLOCKS = 1000
 _MAX_RECORDS = 10_000
 
 
-def text_length(data: bytes, address: int, heaps: set[int]) -> int:
-    """Return the length that the descriptor at an address claims, in bytes."""
+def claimed_length(file: bytes, data: bytes | memoryview, position: int, heaps: set[int]) -> int:
+    """Return the length, in bytes, that a descriptor claims, after a look at its heap."""
     # ``heaps``: addresses of those that were looked at before, in the same file.
-    if not 0 <= address <= len(data) - _DESCRIPTOR:
-        raise ValueError("the text lies outside the file")
-    return _claim(data, data, address, heaps)
-
-
-def _claim(file: bytes, data: bytes | memoryview, position: int, heaps: set[int]) -> int:
-    """Return the length in a descriptor, after a look at the heap that it leads to."""
     length, heap = struct.unpack_from("<IQ", data, position)
     if length and heap not in heaps:
         _check_heap(file, heap)
@@ -71,7 +64,7 @@ def attribute_text_lengths(
             attribute, start = _attribute(message)
             if attribute == name:
                 starts = [start + i * _DESCRIPTOR for i in range(number)]
-                return [_claim(data, message, at, heaps) for at in starts]
+                return [claimed_length(data, message, at, heaps) for at in starts]
     except (struct.error, IndexError) as error:
         raise ValueError("the header of its object is damaged") from error
     lengths = list(_dense_lengths(data, name, number, heaps))
@@ -99,7 +92,7 @@ def _dense_lengths(data: bytes, name: bytes, number: int, heaps: set[int]) -> It
             variable = dtype < len(message) and message[dtype] & 0x0F == _VARIABLE_LENGTH
             if attribute == name and variable and len(message) >= values + number * _DESCRIPTOR:
                 for i in range(number):
-                    yield _claim(data, message, values + i * _DESCRIPTOR, heaps)
+                    yield claimed_length(data, message, values + i * _DESCRIPTOR, heaps)
         position = data.find(terminated, position + 1)
     raise ValueError("an attribute has more namesakes than can be checked")
 

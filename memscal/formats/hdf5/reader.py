@@ -179,7 +179,9 @@ class SafeFile:
         self._spend(path, of.size)
         if of.kind.is_variable_str():
             offset = dataset.get_offset() or -1
-            self._check_length(path, limits.text_length(self._data, offset, self._heaps))
+            self._check_length(
+                path, limits.claimed_length(self._data, self._data, offset, self._heaps)
+            )
         value = np.empty((), dtype=of.kind.dtype)
         dataset.read(h5py.h5s.ALL, h5py.h5s.ALL, value)
         return printable(value[()], MAX_TEXT_BYTES)
