@@ -3,7 +3,7 @@
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from types import MappingProxyType
 from typing import Any
 
@@ -16,7 +16,7 @@ from memscal.formats.hdf5.writer import Attribute, Group, Node, Nodes, Number, s
 from memscal.formats.units import dimension_of, from_si, to_si
 from memscal.model import records
 from memscal.model.apparatus import ApparatusData, ParameterSet
-from memscal.model.arrays import Values
+from memscal.model.arrays import Values, value_record
 from memscal.model.assumptions import Assumption
 from memscal.model.checks import QualityCheck, messages_from_json
 from memscal.model.film import ElasticFilm
@@ -33,7 +33,7 @@ _NOTHING: Mapping[str, Any] = MappingProxyType({})
 _MeasuredOn = Scan | ApparatusData | MeasuredScan
 
 
-@dataclass(frozen=True)
+@value_record
 class Kind:
     """How a quantity that is no number is written (no empty text) and read."""
 

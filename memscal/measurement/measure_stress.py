@@ -180,10 +180,9 @@ def measure_stress(
     overridden = accepted_alterations(sensor.source, *(data.source for data in scans))
     for data in scans:
         overridden += restore.accept_mismatches(data, sensor, override=override)
-    for data in scans:
         require_span(data)
-    origins = tuple(one_load.measured_scan(data) for data in scans)
-    singles = [restore.single_loads(data) for data in scans]
+    origins = tuple(map(one_load.measured_scan, scans))
+    singles = list(map(restore.single_loads, scans))
     for single in chain(*singles):
         restore.require_contact_size(single)
         if single.u_zz_correlation is not None:

@@ -4,10 +4,11 @@ Files, tables, figures and reports take what they write from here and :mod:`mems
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import NamedTuple
 
 from memscal.model.apparatus import ParameterSet
+from memscal.model.arrays import value_record
 from memscal.model.notation import VOLTS, Reading, format_measured
 
 # SI units in the unit that is shown: m in a mm, V in a mV, ...; dividing by MM shows mm.
@@ -75,7 +76,7 @@ def dimension_in(dimension: str, reading: Reading) -> str:
 _OTHER_UNITS = {"um": 1e-6, "MPa": 1e6, "1/mm^2": PER_MM2, "percent": 1e-2}
 
 
-@dataclass(frozen=True)
+@value_record
 class Quantity:
     """A quantity of a record."""
 
@@ -140,7 +141,7 @@ class Quantity:
         return replace(self, dimension=dimension_in(self.dimension, reading))
 
 
-@dataclass(frozen=True)
+@value_record
 class Record:
     """Quantities that stand together: a group of a file, of a NeXus class, with its signal."""
 

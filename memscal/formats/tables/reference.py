@@ -218,9 +218,9 @@ def read_reference_table(
     if shear is not None:
         wanted["sigma_rz"] = Wanted(shear, sigma_unit, "stress")
     columns = table.columns(wanted)
-    columns["sigma_zz"] = sign * columns["sigma_zz"]
+    columns["sigma_zz"] *= sign
     if shear is not None:
-        columns["sigma_rz"] = shear_sign * columns["sigma_rz"]
+        columns["sigma_rz"] *= shear_sign
     samples = Samples(
         columns=columns,
         source=table.source or SourceFile("the table", ""),

@@ -96,7 +96,7 @@ class TextTable(NamedColumns):
             if not block:
                 break
             more_lines, more_comments = self._numbered(block)
-            seen += sum(len(line) for _, line in more_lines + more_comments)
+            seen += len(block)
             lines += more_lines
             comments += more_comments
         below = [(number, line) for number, line in lines if number > skipped]
