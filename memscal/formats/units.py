@@ -33,29 +33,27 @@ ARBITRARY = (
     "LSB",
     "digits",
 )
-# Canonical units of each dimension with the power of ten that takes them to SI; the micro sign and
-# the Greek mu are two characters.
+# Canonical units of each dimension beside the SI unit, with the power of ten that takes them to it;
+# the micro sign and the Greek mu are two characters.
 _POWERS = {
-    "length": {"m": 0, "cm": -2, "mm": -3, "um": -6, "µm": -6, "μm": -6, "nm": -9},
-    "voltage": {"V": 0, "mV": -3, "uV": -6, "µV": -6, "μV": -6},
-    "force": {"kN": 3, "N": 0, "mN": -3, "uN": -6},
-    "stress": {"Pa": 0, "kPa": 3, "MPa": 6, "GPa": 9},
-    "stress squared": {"Pa^2": 0, "kPa^2": 6},
-    "voltage per stress": {"V/Pa": 0, "mV/Pa": -3, "V/MPa": -6, "mV/kPa": -6, "mV/MPa": -9},
-    "area": {"m^2": 0, "mm^2": -6, "um^2": -12},
-    "per area": {"1/m^2": 0, "1/mm^2": 6},
-    "per area squared": {"1/m^4": 0, "1/mm^4": 12},
-    "wavenumber": {"rad/m": 0, "rad/mm": 3, "1/m": 0, "1/mm": 3},
-    "voltage per length": {"V/m": 0, "mV/mm": 0},
-    "angle": {"rad": 0},
-    "energy": {"J": 0},
-    "temperature": {"K": 0},
-    "time": {"s": 0, "ms": -3},
+    "length": {"cm": -2, "mm": -3, "um": -6, "µm": -6, "μm": -6, "nm": -9},
+    "voltage": {"mV": -3, "uV": -6, "µV": -6, "μV": -6},
+    "force": {"kN": 3, "mN": -3, "uN": -6},
+    "stress": {"kPa": 3, "MPa": 6, "GPa": 9},
+    "stress squared": {"kPa^2": 6},
+    "voltage per stress": {"mV/Pa": -3, "V/MPa": -6, "mV/kPa": -6, "mV/MPa": -9},
+    "area": {"mm^2": -6, "um^2": -12},
+    "per area": {"1/mm^2": 6},
+    "per area squared": {"1/mm^4": 12},
+    "wavenumber": {"rad/mm": 3, "1/m": 0, "1/mm": 3},
+    "voltage per length": {"mV/mm": 0},
+    "time": {"ms": -3},
     "stress per length": {"MPa/mm": 9},
-    "dimensionless": dict.fromkeys(("1", "", *ARBITRARY), 0),
+    "dimensionless": dict.fromkeys(("", *ARBITRARY), 0),
 }
 _CANONICAL: dict[str, tuple[str, int]] = {}
-for _dimension, _units in _POWERS.items():
+for _dimension, _si in SI_UNITS.items():
+    _units = {_si: 0, **_POWERS.get(_dimension, {})}
     _CANONICAL |= {unit: (_dimension, power) for unit, power in _units.items()}
 
 # What pint may be asked: names, products and small powers.  Arithmetic such as 9**9**9 is a
