@@ -25,7 +25,7 @@ _CHANGES = "/entry/kernel_changes"
 def artifact_from(file: SafeFile) -> ApparatusData:
     """Read the apparatus function of an open memscal-artifact file; refuse one that was changed."""
     require_schema(file, ARTIFACT_SCHEMA)
-    require_unaltered(file, ARTIFACT_SCHEMA)
+    require_unaltered(file)
     load = read_record(records.LOAD, file, "/entry/indenter", defaults={"load": None})["load"]
     film, indenter = groups.read_stated(file)
     process = groups.read_process(file)
@@ -87,11 +87,11 @@ def artifact_tree(data: ApparatusData) -> Group:
     if data.assumptions:
         children["assumptions"] = groups.assumption_group(data.assumptions)
     if data.kernel_changes:
-        names, changes = zip(*data.kernel_changes.items(), strict=True)
-        group = write_record(records.KERNEL_CHANGES, {"kernel_changes": np.stack(changes)})
-        listed = to_json(list(names))
+        stated = {"kernel_changes": np.stack(list(data.kernel_changes.values()))}
         radii = si(data.radial_profile.r, "length", ("r",))
-        group = replace(group, children={"names": listed, **group.children, "r": radii})
+        group = write_record(records.KERNEL_CHANGES, stated, r=radii)
+        names = to_json(list(data.kernel_changes))
+        group = replace(group, children={"names": names, **group.children})
         children["kernel_changes"] = group
     if data.other is not None:
         name = "bayesian" if data.other.method == "bayesian" else "division"

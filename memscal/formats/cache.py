@@ -72,7 +72,7 @@ def find_contact_table(folder: FilePath, key: str) -> Arrays | None:
     try:
         with open_hdf5(path) as file:
             require_schema(file, CONTACT_TABLE_SCHEMA)
-            require_unaltered(file, CONTACT_TABLE_SCHEMA)
+            require_unaltered(file)
             if file.text("/entry/key") != key:
                 return None
             arrays = {

@@ -45,15 +45,16 @@ def require_schema(file: SafeFile, schema: str) -> str:
 _PATH = re.compile(r"/|(?:/[a-z][a-z0-9_]*)+")
 
 
-def has_no_digest(file: SafeFile, schema: str | None) -> bool:
+def has_no_digest(file: SafeFile) -> bool:
     """Return whether a file has no digest and needs none: other programs write such, too."""
+    schema = file.attribute("/", writer.SCHEMA_ATTRIBUTE)
     needs_none = schema in (writer.SCAN_SCHEMA, writer.REFERENCE_SCHEMA, None)
     return needs_none and file.attribute("/", writer.DIGEST_ATTRIBUTE) is None
 
 
-def require_unaltered(file: SafeFile, schema: str | None) -> None:
+def require_unaltered(file: SafeFile) -> None:
     """Refuse a file whose content is not what was written; or record it, where that is accepted."""
-    if file.verified or has_no_digest(file, schema):
+    if file.verified or has_no_digest(file):
         return
     problem = altered(file)
     if problem:

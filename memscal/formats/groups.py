@@ -348,13 +348,12 @@ def _shape(file: SafeFile, path: str) -> str:
 
 def instrument_group(of: _MeasuredOn) -> Group:
     """Return the NXinstrument that holds the sensor, and load cell and stage if they are stated."""
-    parts = {"stress_sensor": write_record(records.SENSOR, of.sensor)}
+    parts = {"stress_sensor": write_record(records.SENSOR, of.sensor, **_NOWHERE)}
     if of.load_cell != LoadCell():
-        parts["load_cell"] = write_record(records.LOAD_CELL, of.load_cell)
+        parts["load_cell"] = write_record(records.LOAD_CELL, of.load_cell, **_NOWHERE)
     if of.stage != Equipment():
-        parts["stage"] = write_record(records.STAGE, of.stage)
-    children = {n: replace(g, children={**g.children, **_NOWHERE}) for n, g in parts.items()}
-    return Group("NXinstrument", children)
+        parts["stage"] = write_record(records.STAGE, of.stage, **_NOWHERE)
+    return Group("NXinstrument", parts)
 
 
 def read_instrument(file: SafeFile, path: str = "/entry") -> Values:

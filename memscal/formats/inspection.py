@@ -144,7 +144,7 @@ def check(path: FilePath) -> list[Finding]:
             version = require_schema(file, schema)
             findings.append(Finding(step, True, f"{schema}, version {version}."))
             step = "digest"
-            findings.append(_digest(file, schema))
+            findings.append(_digest(file))
             if not findings[-1].passed:
                 return findings
             step = "content"
@@ -155,9 +155,9 @@ def check(path: FilePath) -> list[Finding]:
     return findings
 
 
-def _digest(file: SafeFile, schema: str) -> Finding:
+def _digest(file: SafeFile) -> Finding:
     """Results must have a digest: scans and references may come from other programs."""
-    if has_no_digest(file, schema):
+    if has_no_digest(file):
         return Finding("digest", True, "None, as other programs write them: no change would show.")
     problem = altered(file)
     if problem:
@@ -187,15 +187,20 @@ def _layout(file: SafeFile, schema: str) -> Iterator[tuple[str, Record]]:
 
 
 def _quantity_row(file: SafeFile, path: str) -> Values:
-    row: Values = {"path": path, "name": path.rpartition("/")[2]}
+    unit = None
     if file.is_text(path):
-        row["value"] = file.text(path)
+        value: Any = file.text(path)
     else:
         number = file.only_number(path, file.array(path))
-        row["value"] = "inf" if number == np.inf else _plain(number)
-    row["standard_uncertainty"] = _uncertainty(file, path)
-    row["unit"] = None if file.is_text(path) else file.units_of(path) or "1"
-    return row
+        value = "inf" if number == np.inf else _plain(number)
+        unit = file.units_of(path) or "1"
+    return {
+        "path": path,
+        "name": path.rpartition("/")[2],
+        "value": value,
+        "standard_uncertainty": _uncertainty(file, path),
+        "unit": unit,
+    }
 
 
 def _uncertainty(file: SafeFile, path: str) -> float | int | None:

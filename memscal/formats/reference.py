@@ -167,13 +167,13 @@ def _image(data: bytes) -> NDArray[Any]:
 def profile_from(file: SafeFile) -> StressProfile:
     """Read the profile of an open memscal-reference file, or a field of another program."""
     if file.attribute("/", writer.SCHEMA_ATTRIBUTE) is None:
-        require_unaltered(file, None)
+        require_unaltered(file)
         path = ""
         while isinstance(name := file.attribute(path or "/", "default"), str) and len(path) < 99:
             path = f"{path}/{name}"
         return read_field(file, path).profile()
     require_schema(file, REFERENCE_SCHEMA)
-    require_unaltered(file, REFERENCE_SCHEMA)
+    require_unaltered(file)
     return read_profile(file, prefix="")
 
 

@@ -82,7 +82,7 @@ def scan_from(file: SafeFile, most: int | None = None) -> Scan:
         if size > most:
             cure = "Average neighbouring readings, thin the raster, or leave out repeats."
             raise too_large(file.name, size, most, "points", cure=cure)
-    require_unaltered(file, writer.SCAN_SCHEMA)
+    require_unaltered(file)
     load = read_record(records.LOAD, file, "/entry/indenter", defaults={"load": None})
     with placed(file.where("/entry/indenter/friction_coefficient")):
         require_rod_friction(load.get("rod_friction"))

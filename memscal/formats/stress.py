@@ -3,7 +3,6 @@
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -129,7 +128,7 @@ def read_stress(path: FilePath, *, accept_altered: bool = False) -> MeasuredStre
 def stress_from(file: SafeFile) -> MeasuredStress:
     """Read the measured stress of an open memscal-stress file."""
     require_schema(file, writer.STRESS_SCHEMA)
-    require_unaltered(file, writer.STRESS_SCHEMA)
+    require_unaltered(file)
     paths = profile_paths(file)
     if not paths:
         raise FormatError(
@@ -209,18 +208,18 @@ def _entry(measured: MeasuredStress) -> Group:
 
 
 def _profile_group(profile: MeasuredProfile, scans: tuple[MeasuredScan, ...]) -> Group:
-    arrays = write_record(records.STRESS_PROFILE, profile)
     record = records.STRESS_NUMBERS.read_in(profile.scan.reading)
-    numbers = dict(write_record(record, _numbers(profile)).children)
+    stated = {q.name: getattr(profile, q.name, None) for q in record.quantities}
+    # A line does not determine its centre across it.
+    for i, name in enumerate(("centre", "centre_y")):
+        if i == 0 or profile.centre_uncertainty[i] > 0:
+            stated[name] = profile.centre[i]
+            stated[f"{name}_uncertainty"] = profile.centre_uncertainty[i]
+    numbers = dict(write_record(record, stated).children)
     # What not every profile has comes last.
     optional = {name: numbers.pop(name) for name in _NOT_ALWAYS if name in numbers}
-    children = {
-        **arrays.children,
-        "scan": writer.count(scans.index(profile.scan) + 1),
-        **numbers,
-        **optional,
-    }
-    return replace(arrays, children=children)
+    number = writer.count(scans.index(profile.scan) + 1)
+    return write_record(records.STRESS_PROFILE, profile, scan=number, **numbers, **optional)
 
 
 def _parts_of_profiles(profiles: Sequence[MeasuredProfile]) -> dict[str, Group]:
@@ -251,17 +250,6 @@ def _roots_group(profile: MeasuredProfile) -> Group:
         if root.ndim > 1:
             children[axes[1]] = writer.index_axis(axes[1], root.shape[1])
     return Group("NXcollection", children)
-
-
-def _numbers(profile: MeasuredProfile) -> dict[str, Any]:
-    """Return the numbers of a profile; a line does not determine its centre across it."""
-    names = {quantity.name for quantity in records.STRESS_NUMBERS.quantities}
-    numbers = {name: getattr(profile, name) for name in names if not name.startswith("centre")}
-    for i, name in enumerate(("centre", "centre_y")):
-        stated = i == 0 or profile.centre_uncertainty[i] > 0
-        numbers[name] = profile.centre[i] if stated else None
-        numbers[f"{name}_uncertainty"] = profile.centre_uncertainty[i] if stated else None
-    return numbers
 
 
 def _part_of_profile(file: SafeFile, group: str, name: str, within: str) -> str:

@@ -231,9 +231,8 @@ def _write_group(group: Any, node: Group) -> None:
     _write_attributes(group, node)
     for name, child in node.children.items():
         if not _NAME.fullmatch(name):
-            problem = f"{name!r} cannot be written into {group.name}"
             raise InputError(
-                f"{problem}: a name is lower-case ASCII.",
+                f"{name!r} cannot be written into {group.name}: a name is lower-case ASCII.",
                 cure="Use the letters a to z, digits and underscores.",
             )
         if isinstance(child, Group):
