@@ -244,10 +244,8 @@ def prepared_scan(scan: Scan, apparatus: ApparatusFunction, signal: ContactSigna
     load_share = 0.0 if errors is None else np.nan_to_num(errors) / scan.stated_load
     x, y = scan.positions
     level = replace(nominal, u_zz=scan.u_zz - 0.0 * excess)
-    prepared = PreparedScan(level, stated)
     # Centre and noise are estimated twice, the second time from the first one's scan.
     for find in (_found_quickly, _found):
-        level = prepared.scan
         found = find(level, apparatus)
         distance = np.hypot(x - found.centre[0], y - found.centre[1])
         slope = np.interp(distance, signal.r, _slope(signal, found))
@@ -258,8 +256,7 @@ def prepared_scan(scan: Scan, apparatus: ApparatusFunction, signal: ContactSigna
             electronic = np.full_like(slope, noise)
         level = replace(nominal, u_zz=scan.u_zz - slope * excess)
         level = _with_noise(level, electronic, load_noise)
-        prepared = PreparedScan(level, electronic, found.estimate)
-    return prepared
+    return PreparedScan(level, electronic, found.estimate)
 
 
 def _slope(signal: ContactSignal, found: _Found) -> FloatArray:

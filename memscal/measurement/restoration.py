@@ -149,10 +149,10 @@ class Restoration(Result, Checked):
         """Standard uncertainty of the force by source, in N."""
         row = self._at_zero
         n = self.posterior.nodes
-        budget = {}
-        for name, covariance in self.posterior.covariances.items():
-            budget[name] = float(np.sqrt(max(float(row @ covariance[:n, :n] @ row), 0.0)))
-        return budget
+        return {
+            name: float(np.sqrt(max(float(row @ covariance[:n, :n] @ row), 0.0)))
+            for name, covariance in self.posterior.covariances.items()
+        }
 
     @property
     def centre(self) -> FloatArray:

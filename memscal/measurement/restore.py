@@ -68,8 +68,9 @@ def single_loads(scan: Scan) -> tuple[Scan, ...]:
     if scan.kind != "repeats" and not passes.any():
         return (replace(scan, load=_line_load(scan, scan.normal_load, "")),)
     lines = range(int(passes.max()) + 1)
-    recorded = [scan.normal_load[passes == i] for i in lines]
-    loads = np.array([_line_load(scan, recorded[i], f", line {i + 1}") for i in lines])
+    loads = np.array(
+        [_line_load(scan, scan.normal_load[passes == i], f", line {i + 1}") for i in lines]
+    )
     order = np.argsort(loads, kind="stable")
     starts = np.flatnonzero(np.diff(loads[order]) > _ONE_LOAD * loads[order][:-1]) + 1
     singles = []
