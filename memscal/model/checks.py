@@ -1,5 +1,6 @@
 """Quality checks and messages of a result: their records, the limits they share, their wording."""
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
@@ -110,11 +111,8 @@ joint_chi_square: all loads of a kind against one friction coefficient, chi-squa
 lubricated_frictionless: lubricated loads against no friction: rise of -2 ln p
     more friction than counted, or a wrong A, load or thickness: doubt the dry ones
 """
-_LINES = _EXPLAINED.splitlines()
-_NAMED = [line.partition(": ") for line in _LINES[::2]]
-EXPLANATIONS = {
-    name: (tests, cure.strip()) for (name, _, tests), cure in zip(_NAMED, _LINES[1::2], strict=True)
-}
+_ENTRIES = re.findall(r"(\w+): (.*)\n +(.*)\n", _EXPLAINED)
+EXPLANATIONS: dict[str, tuple[str, str]] = {name: (tests, cure) for name, tests, cure in _ENTRIES}
 """What each kind of check tests, and what to do if it fails; docs/quality.md has the same."""
 
 

@@ -89,7 +89,7 @@ class MeasuredScan:
     def __post_init__(self) -> None:
         object.__setattr__(self, "film", _kept_record(self.film, "thickness", "roughness_rms"))
         object.__setattr__(self, "indenter", _kept_record(self.indenter, "radius"))
-        object.__setattr__(self, "width", _kept(self.width))
+        _freeze(self, "width", scale=_FILE_SCALE)
 
 
 @keyword_array_record
@@ -203,10 +203,9 @@ class MeasuredProfile(ByContent):
     def __post_init__(self) -> None:
         _freeze(self, "s_zz", "curve_s_zz")
         _freeze(self, "x", "y", "r", "centre", "centre_uncertainty", "curve_r", scale=_FILE_SCALE)
+        _freeze(self, "baseline", "baseline_uncertainty", "contact_radius", scale=_FILE_SCALE)
         frozen = {source: frozen_array(values) for source, values in self.roots.items()}
         object.__setattr__(self, "roots", frozen)
-        for name in ("baseline", "baseline_uncertainty", "contact_radius"):
-            object.__setattr__(self, name, _kept(getattr(self, name)))
 
     def __repr__(self) -> str:
         """Return load, force and maximum in place of arrays."""
@@ -303,8 +302,8 @@ class MeasuredStress(Result, Checked, ByContent):
     artifact_digest: str = ""
 
     def __post_init__(self) -> None:
-        for name in ("conversion_constant", "conversion_constant_uncertainty"):
-            object.__setattr__(self, name, _kept(getattr(self, name)))
+        names = ("conversion_constant", "conversion_constant_uncertainty")
+        _freeze(self, *names, scale=_FILE_SCALE)
 
     def __repr__(self) -> str:
         """Return the loads and the state of the checks."""
@@ -348,8 +347,9 @@ def _kept_record(record: Record, *lengths: str) -> Record:
 
 
 def _freeze(owner: object, *names: str, scale: float = 1.0) -> None:
-    """Replace arrays by read-only copies, those of lengths and voltages (``scale``) rounded."""
+    """Replace arrays by read-only copies; round them, and numbers, of lengths and voltages."""
     for name in names:
         values = getattr(owner, name)
         if values is not None:
-            object.__setattr__(owner, name, frozen_array(frozen_array(values) * scale / scale))
+            kept = frozen_array(frozen_array(values) * scale / scale)
+            object.__setattr__(owner, name, kept if kept.ndim else float(kept))

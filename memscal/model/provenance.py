@@ -81,8 +81,11 @@ class Process:
         import numpy as np
         import scipy
 
-        versions = {"numpy": np.__version__, "scipy": scipy.__version__}
-        stated["environment"] = {"python": platform.python_version(), **versions}
+        stated["environment"] = {
+            "python": platform.python_version(),
+            "numpy": np.__version__,
+            "scipy": scipy.__version__,
+        }
         return cls(program="memscal", version=__version__, date=timestamp(), **stated)
 
 

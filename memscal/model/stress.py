@@ -172,9 +172,9 @@ class StressField:
             require_increasing(f"{name} of the field", axis)
             steps = np.diff(axis)
             if not _FEWEST <= axis.size <= MOST_PIXELS or np.ptp(steps) > _EVEN * steps.mean():
-                problem = f"{name} of the field has {axis.size} values, or uneven ones"
                 raise InputError(
-                    f"{problem}: not {_FEWEST} to {MOST_PIXELS} even ones.",
+                    f"{name} of the field has {axis.size} values, or uneven ones: not {_FEWEST} to "
+                    f"{MOST_PIXELS} even ones.",
                     cure="Cut out what is not zero, and interpolate it to even pixels.",
                 )
         shape = np.shape(self.values)
@@ -325,8 +325,10 @@ class StressProfile:
                 values = finite_vector(f"{name} of the stress profile", stated)
                 object.__setattr__(self, name, values)
                 if values.size != self.r.size:
-                    count = f"{values.size} values for {self.r.size} radii"
-                    raise InputError(f"{name} of the stress profile has {count}.")
+                    raise InputError(
+                        f"{name} of the stress profile has {values.size} values for "
+                        f"{self.r.size} radii."
+                    )
         require_increasing("r of the stress profile", self.r)
         if self.r[0] < 0:
             raise InputError(
