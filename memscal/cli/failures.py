@@ -58,8 +58,9 @@ def _handle_ending(handler: Any) -> dict[int, Any]:
     """Set a handler of the signals that end a program; one that nohup has it ignore stays so."""
     names = ("SIGINT", "SIGTERM", "SIGHUP")
     numbers = [getattr(signal, name) for name in names if hasattr(signal, name)]
-    heard = [n for n in numbers if signal.getsignal(n) is not signal.SIG_IGN]
-    return {number: signal.signal(number, handler) for number in heard}
+    return {
+        n: signal.signal(n, handler) for n in numbers if signal.getsignal(n) is not signal.SIG_IGN
+    }
 
 
 class _Ended(KeyboardInterrupt):

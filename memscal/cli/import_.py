@@ -313,8 +313,14 @@ def command(
             write_reference(reference.profile, output, overwrite=force)
         warnings = [note for note in notes if note.severity == "warning"]
         if as_json:
-            head = {"schema_version": "1", "output": str(output), "format": kind}
-            out.emit_json({**head, "notes": marked_texts(notes)})
+            out.emit_json(
+                {
+                    "schema_version": "1",
+                    "output": str(output),
+                    "format": kind,
+                    "notes": marked_texts(notes),
+                }
+            )
         else:
             out.emit(readable("\n".join(note.text for note in notes if note not in warnings)))
     out.show_messages(warnings)

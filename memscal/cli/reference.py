@@ -189,9 +189,14 @@ def command(indenter: str, as_json: bool, force: bool, **options: Any) -> None:
         if as_json:
             # A rod's contact does not depend on the loading that was asked for.
             loading = {"loading": options["loading"]}
-            solutions = [contact.to_dict() | loading for contact in contacts]
-            head = {"schema_version": "1", "output": output and str(output)}
-            out.emit_json({**head, "solutions": solutions, "warnings": warnings})
+            out.emit_json(
+                {
+                    "schema_version": "1",
+                    "output": output and str(output),
+                    "solutions": [contact.to_dict() | loading for contact in contacts],
+                    "warnings": warnings,
+                }
+            )
         else:
             out.emit_tables(contacts_table(contacts))
     out.show_messages(messages)
@@ -243,10 +248,7 @@ def _pressed(indenter: str, options: Options) -> list[Contact]:
             load=loads,
             depth=depths or None,
             friction=friction,
-            loading=options["loading"],
-            backend=options["backend"],
-            rings=options["rings"],
             interface=interface_of(options),
-            film_radius=options["film_radius"],
+            **{name: options[name] for name in ("loading", "backend", "rings", "film_radius")},
             strain="linear" if linear else "finite",
         )
