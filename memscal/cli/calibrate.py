@@ -283,7 +283,7 @@ def command(
     output = output or out.default_name(scans[0], ending)
     settings = calibration_settings(reference=reference, alternative=alternative, **settings)
     data = _read(scans, reference, settings)
-    outputs = [path for path in (output, report, *figures, sweep_figure) if path is not None]
+    outputs = list(filter(None, (output, report, *figures, sweep_figure)))
     out.prove_writable(outputs, force=force, inputs=[*scans, reference, alternative])
     if dry_run:
         _rehearse(data, settings, outputs, as_json)
@@ -314,12 +314,11 @@ def command(
     return exit_code_of(apparatus.checks, then=then)
 
 
-def _read(paths: tuple[Path, ...], reference: Path | None, settings: Options) -> list[Scan]:
+def _read(paths: tuple[Path, ...], reference: Path | None, settings: Options) -> Sequence[Scan]:
     from memscal.formats.opened import opened_scans
     from memscal.model.sizes import MOST_OF_LINES
 
-    accepted = settings["accept_altered"]
-    scans = list(opened_scans(paths, MOST_OF_LINES, accept_altered=accepted))
+    scans = opened_scans(paths, MOST_OF_LINES, accept_altered=settings["accept_altered"])
     for scan, path in zip(scans, paths, strict=True):
         if reference is not None and scan.reference is not None:
             out.note(f"{reference.name} is used in place of the reference in {path.name}.")
@@ -342,7 +341,9 @@ def _read_reference(path: Path, pixel_size: str | None, accepted: bool) -> Stres
     return read_reference(path, pixel_size=size, accept_altered=accepted)
 
 
-def _rehearse(scans: list[Scan], settings: Options, outputs: Sequence[Path], as_json: bool) -> None:
+def _rehearse(
+    scans: Sequence[Scan], settings: Options, outputs: Sequence[Path], as_json: bool
+) -> None:
     """Check what a calibration checks before it computes, and print what it would do."""
     from memscal.calibration.prepare import Request, prepare
     from memscal.calibration.stages import require_channel_method

@@ -11,7 +11,6 @@ import click
 from memscal.cli import output as out
 from memscal.cli.options import (
     FILE,
-    FILM,
     FILM_NUMBERS,
     FREE_OR_STUCK,
     LAW,
@@ -381,7 +380,7 @@ _UNKNOWN = (
 
 def _set_up(options: Options) -> dict[str, Any]:
     stated: dict[str, Any] = {}
-    if _stated(options, [name for name in options if name.startswith((*FILM, *LAW))]):
+    if _stated(options, (*FILM_NUMBERS, *LAW)):
         stated["film"] = film_from(options, _UNKNOWN)
     if _stated(options, ("indenter", "radius", "radius_uncertainty", "rod_friction")):
         stated["indenter"] = indenter_from(options["indenter"] or "rod", options)

@@ -245,8 +245,8 @@ def prove_writable(
     outputs: Iterable[Path | None], *, force: bool, inputs: Iterable[Path | None] = ()
 ) -> None:
     """Refuse outputs that share a name, and prove that each that is asked for can be written."""
-    wanted = [output for output in outputs if output is not None]
-    read = [path for path in inputs if path is not None]
+    wanted = list(filter(None, outputs))
+    read = list(filter(None, inputs))
     seen: dict[Path, Path] = {}
     for output in wanted:
         real = Path(os.path.realpath(output))
@@ -284,9 +284,8 @@ def drawn(
 
 def say_written(paths: Iterable[Path | None]) -> None:
     """Name the files that were written, where there are any."""
-    for path in paths:
-        if path is not None:
-            message(f"Written: {path}")
+    for path in filter(None, paths):
+        message(f"Written: {path}")
 
 
 def write_files(contents: Mapping[Path, bytes], *, force: bool) -> None:

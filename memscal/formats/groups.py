@@ -404,10 +404,9 @@ def _form(form: IdealReference | StressField) -> Group:
     """Return an ideal reference, or a field as NXdata in its own unit."""
     if isinstance(form, IdealReference):
         return write_record(records.IDEAL_REFERENCE, form)
-    axes = {name: si(getattr(form, name), "length", (name,)) for name in "xy"}
+    axes: Nodes = {name: si(getattr(form, name), "length", (name,)) for name in "xy"}
     axes["field"] = Number(form.values, form.unit, ("y", "x"))
-    if form.load is not None:
-        axes["load"] = si(form.load, "force")
+    axes |= write_record(records.LOAD, form).children
     return Group("NXdata", axes, {"signal": "field", "axes": ("y", "x")})
 
 

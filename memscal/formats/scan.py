@@ -274,13 +274,12 @@ def _stated_axes(file: SafeFile, rank: int) -> Iterator[tuple[int, str]]:
 
 
 def _synthetic_group(truth: Mapping[str, float | str]) -> Group:
-    children: Nodes = {"description": _SYNTHETIC}
-    children |= {
+    values = {
         name: value if isinstance(value, str) else si(value, groups.parameter_dimension(name))
         for name, value in truth.items()
     }
-    children["names"] = writer.to_json(list(truth))
-    return Group("NXcollection", children)
+    names = writer.to_json(list(truth))
+    return Group("NXcollection", {"description": _SYNTHETIC, **values, "names": names})
 
 
 def _read_synthetic(file: SafeFile) -> Values | None:

@@ -14,7 +14,7 @@ from memscal.estimation.points import ScanPoints
 from memscal.formats.reference import read_reference
 from memscal.measurement.posterior import Posterior, film_transfer, reach_of, sensor_changes
 from memscal.mechanics.contact import BaseStress, Contact
-from memscal.model.arrays import FloatArray, array_record
+from memscal.model.arrays import FloatArray, array_record, floats
 from memscal.model.checks import (
     OVERRIDE,
     Checked,
@@ -293,7 +293,7 @@ class Restoration(Result, Checked):
 
     def _synthesis(self, r: ArrayLike) -> FloatArray:
         """Matrix from the transform at the nodes to values at radii."""
-        radii = np.abs(np.asarray(r, dtype=np.float64))
+        radii = np.abs(floats(r))
         reach = reach_of(self.points)
         if not np.all(radii <= reach):
             raise InputError(

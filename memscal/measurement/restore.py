@@ -102,7 +102,7 @@ def place_of(scan: Scan) -> str:
 def load_of(scan: Scan) -> str:
     """Name a scan's file, load and lubrication, for messages."""
     words = (place_of(scan), f"{scan.load:.4g} N", scan.lubrication)
-    return ", ".join(word for word in words if word)
+    return ", ".join(filter(None, words))
 
 
 def _line_load(scan: Scan, loads: FloatArray, line: str) -> float:

@@ -216,7 +216,7 @@ class MeasuredProfile(ByContent):
     @property
     def label(self) -> str:
         """Load and lubrication in words, as in ``"0.34 N, dry"``."""
-        return ", ".join(words for words in (f"{self.load:.4g} N", self.lubrication) if words)
+        return ", ".join(filter(None, (f"{self.load:.4g} N", self.lubrication)))
 
     @property
     def lubrication(self) -> str:

@@ -100,7 +100,13 @@ class NamedColumns:
             to_si(0.0, item.unit, item.dimension, self.where(item.column))
         asked = [self._index(item.column) for item in items]
         self.others = ", ".join(n for i, n in enumerate(self.names) if i not in asked)
-        rows = self._expected(len(wanted))
+        # A scan has up to three arrays more than columns, and its file must be read again.
+        most = min(MOST_ROWS, MOST_HDF5_BYTES // (8 * (len(wanted) + 3)))
+        rows = self._count()
+        if rows > most:
+            cure = "Average neighbouring readings, or cut the table into several."
+            of = f"{self._row}s of {len(wanted)} columns"
+            raise too_large(self._name, rows, most, of, cure=cure)
         count = 0
         # Lines may have other ends than were counted; room that stays empty is no memory.
         values = [np.empty(2 * rows + _SPARE) for _ in wanted]
@@ -188,16 +194,6 @@ class NamedColumns:
                 "(--delimiter).",
             )
         return int(sought) - 1
-
-    def _expected(self, columns: int) -> int:
-        """Return how many rows to expect; refuse more of some columns than are taken."""
-        # A scan has up to three arrays more than columns, and its file must be read again.
-        most = min(MOST_ROWS, MOST_HDF5_BYTES // (8 * (columns + 3)))
-        rows = self._count()
-        if rows > most:
-            cure = "Average neighbouring readings, or cut the table into several."
-            raise too_large(self._name, rows, most, f"{self._row}s of {columns} columns", cure=cure)
-        return rows
 
     def _count(self) -> int:
         """Return how many rows there are, or may be."""

@@ -99,14 +99,14 @@ class TextTable(NamedColumns):
             seen += len(block)
             lines += more_lines
             comments += more_comments
-        below = [(number, line) for number, line in lines if number > skipped]
+        below = [entry for entry in lines if entry[0] > skipped]
         if not below:
             cure = "Give a table with one row per reading."
             raise FormatError(f"{self._name} holds no table.", cure=cure)
         stated = "\t" if sheet or delimiter == "TAB" else delimiter
         self._sure = stated is not None
         self._delimiter = stated or find_delimiter([s for _, s in below])
-        self._find_head(below, [(n, s) for n, s in comments if n > skipped])
+        self._find_head(below, [entry for entry in comments if entry[0] > skipped])
         self._said = [line for n, line in sorted(lines + comments) if n < self._header]
         self._comments: list[int] = []
         self._leave_out([entry for entry in comments if entry[0] > self._first[1][0]])
