@@ -289,10 +289,22 @@ def _revise(
     settled = np.array_equal(slip, status.slip)
     law = problem.interface.normal_law
     if law is None:
-        pressing = _revised_contact(status, trial, held, careful)
+        # Let go of rings that pull, and catch rings that would pass through the indenter.
+        pull = -p / np.abs(p).max(initial=1e-300)
+        overlap = -separation / max(abs(trial.depth), 1e-300)
+        wrong = np.where(status.pressing, pull, overlap)
+        if held is not None:
+            wrong[held] = 0.0
+        pressing = status.pressing ^ _changing(wrong, careful)
         settled &= np.array_equal(pressing, status.pressing)
     else:
-        separation = _revised_separation(problem.film, law, status, trial)
+        # Where the surfaces part, the linear equations' own separation; where they close, the one
+        # at which the (convex) law bears the linear equations' pressure.
+        before = status.separation
+        parting = np.maximum(separation, np.minimum(before, 0.0) - _PLUNGE * law.length)
+        closing = status.pressing & (separation < before) & (p > 0)
+        borne = law.separation(np.where(closing, p, 1.0), problem.film)
+        separation = np.where(closing, np.clip(borne, separation, before), parting)
         pressing = _bearing(problem, law, separation)
     stretch = status.stretch
     if not problem.interface.rigid:
@@ -308,16 +320,6 @@ def _changing(wrong: FloatArray, careful: bool) -> BoolArray:
     if careful:
         changing &= np.arange(wrong.size) == np.argmax(wrong)
     return changing
-
-
-def _revised_contact(status: _Status, trial: _Trial, held: int | None, careful: bool) -> BoolArray:
-    """Let go of rings that pull, and catch rings that would pass through the indenter."""
-    pull = -trial.pressure / np.abs(trial.pressure).max(initial=1e-300)
-    overlap = -trial.separation / max(abs(trial.depth), 1e-300)
-    wrong = np.where(status.pressing, pull, overlap)
-    if held is not None:
-        wrong[held] = 0.0
-    return status.pressing ^ _changing(wrong, careful)
 
 
 def _revised_slip(
@@ -345,18 +347,3 @@ def _revised_slip(
     turns = np.abs(stretch) > np.maximum(turn, length)
     turned = np.where(turns, -np.sign(stretch), 0)
     return np.where(changing, np.where(sticks, np.sign(q), turned), status.slip)
-
-
-def _revised_separation(
-    film: ElasticFilm, law: NormalLaw, status: _Status, trial: _Trial
-) -> FloatArray:
-    """Return the next trial of the separations."""
-    # Where the surfaces part, the linear equations' own; where they close, the one at which the
-    # (convex) law bears the linear equations' pressure.
-    before = status.separation
-    gap = trial.separation
-    p = trial.pressure
-    after = np.maximum(gap, np.minimum(before, 0.0) - _PLUNGE * law.length)
-    closing = status.pressing & (gap < before) & (p > 0)
-    borne = law.separation(np.where(closing, p, 1.0), film)
-    return np.where(closing, np.clip(borne, gap, before), after)
