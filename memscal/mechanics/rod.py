@@ -217,16 +217,10 @@ def solve_rod(radius_ratio: float, poisson_ratio: float, *, sticking: bool) -> R
 
 
 def _solve(ratio: float, nu: float, sticking: bool, terms: int, order: int) -> RodSolution:
-    """Return the Galerkin solution, of unknown convergence."""
-    matrix = _energy_matrix(ratio, nu, sticking, terms, order)
-    solution = np.linalg.solve(matrix, np.eye(1, matrix.shape[0])[0])
-    scaled = solution / solution[0]
-    scaled.setflags(write=False)
-    return RodSolution(float(np.pi / 2 * solution[0]), scaled[:terms], scaled[terms:], np.nan)
+    r"""Return the Galerkin solution, of unknown convergence.
 
-
-def _energy_matrix(ratio: float, nu: float, sticking: bool, terms: int, order: int) -> FloatArray:
-    r"""Return :math:`\int j_m(\xi) j_n(\xi) \{W, X, Y\}(\xi h/a)\,d\xi`, even rows before odd."""
+    Its matrix is :math:`\int j_m(\xi) j_n(\xi) \{W, X, Y\}(\xi h/a)\,d\xi`, even rows before odd.
+    """
     # The integrand turns at the rate 2 a in k, and the poles lie 0.74/h off the axis.
     xi, weights = gauss_panels(_LARGEST_KH * ratio, min(1.5 * ratio, 6.0), order)
     x = xi / ratio
@@ -238,17 +232,20 @@ def _energy_matrix(ratio: float, nu: float, sticking: bool, terms: int, order: i
     matrix = np.diag(np.pi / (4 * even_orders + 2))
     by_normal, by_coupling, by_radial = corrections(x, nu)
     matrix += (even * (weights * by_normal)) @ even.T
-    if not sticking:
-        return matrix
-    radial = np.diag(np.pi / (4 * even_orders + 6))
-    radial += (odd * (weights * by_radial)) @ odd.T
-    # Of the half-space: the integral of j_l j_m is sin((l - m) pi/2)/((l - m)(l + m + 1)).
-    apart = even_orders[:, None] - even_orders - 1
-    both = even_orders[:, None] + even_orders + 1
-    products = np.where(apart % 4 == 1, 1.0, -1.0) / (apart * (both + 1))
-    coupling = half_space_coupling(nu) * products
-    coupling += (even * (weights * by_coupling)) @ odd.T
-    return np.block([[matrix, coupling], [coupling.T, radial]])
+    if sticking:
+        radial = np.diag(np.pi / (4 * even_orders + 6))
+        radial += (odd * (weights * by_radial)) @ odd.T
+        # Of the half-space: the integral of j_l j_m is sin((l - m) pi/2)/((l - m)(l + m + 1)).
+        apart = even_orders[:, None] - even_orders - 1
+        both = even_orders[:, None] + even_orders + 1
+        products = np.where(apart % 4 == 1, 1.0, -1.0) / (apart * (both + 1))
+        coupling = half_space_coupling(nu) * products
+        coupling += (even * (weights * by_coupling)) @ odd.T
+        matrix = np.block([[matrix, coupling], [coupling.T, radial]])
+    solution = np.linalg.solve(matrix, np.eye(1, matrix.shape[0])[0])
+    scaled = solution / solution[0]
+    scaled.setflags(write=False)
+    return RodSolution(float(np.pi / 2 * solution[0]), scaled[:terms], scaled[terms:], np.nan)
 
 
 def _largest_change(fine: RodSolution, coarse: RodSolution, ratio: float, nu: float) -> float:
