@@ -56,7 +56,10 @@ def _mixture(lower: ContactState, upper: ContactState, target: Target) -> Contac
 
 
 def _step_at_once(problem: ContactProblem, smooth: ContactState, target: Target) -> ContactState:
-    """Return the state at ``target``, one step from the untouched film."""
+    """Return the state at ``target``, one step from the untouched film.
+
+    Where it does not settle, its edge lies between two rings: states that meet there are mixed.
+    """
     untouched = np.zeros_like(problem.heights)
     start = replace(smooth, anchor=untouched, outward=untouched)
     try:
@@ -65,13 +68,6 @@ def _step_at_once(problem: ContactProblem, smooth: ContactState, target: Target)
         rings = int(np.count_nonzero(start.touching))
         if problem.interface.normal_law is not None or not np.all(start.touching[:rings]):
             raise
-    return _between_rings(problem, start, target, rings)
-
-
-def _between_rings(
-    problem: ContactProblem, start: ContactState, target: Target, rings: int
-) -> ContactState:
-    """Find the neighbouring rings between which the edge lies; mix the states that meet there."""
 
     def meeting_at(ring: int) -> ContactState:
         inside = replace(start, touching=np.arange(start.touching.size) < ring)
