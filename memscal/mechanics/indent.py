@@ -160,7 +160,16 @@ def indent(
                 "end.",
                 cure='Use backend="fem" for a film with a free edge.',
             )
-    targets, several = _targets(load, depth)
+    if (load is None) == (depth is None):
+        problem = "Give either a load or a depth" + (", not both." if load is not None else ".")
+        raise InputError(problem, why="One follows from the other.")
+    values = np.asarray(load if depth is None else depth, dtype=np.float64)
+    if values.ndim > 1 or values.size == 0:
+        raise InputError(f"The loads or depths have shape {values.shape}; give a flat list.")
+    for value in values.flat:
+        require_positive("load" if depth is None else "depth", value, "N" if depth is None else "m")
+    kind = Load if depth is None else Depth
+    targets = tuple(kind(float(value)) for value in values.flat)
     interface = interface or Interface()
     friction = float(friction)
     request = RingRequest(
@@ -175,7 +184,7 @@ def indent(
         contacts = tuple(_rod_contact(film, indenter, target, friction) for target in targets)
     else:
         contacts = solve_on_rings(request)
-    return list(contacts) if several else contacts[0]
+    return list(contacts) if values.ndim else contacts[0]
 
 
 def changes_by_inputs(contact: Contact) -> list[tuple[Contact, Contact, float]]:
@@ -198,22 +207,6 @@ def changes_by_inputs(contact: Contact) -> list[tuple[Contact, Contact, float]]:
             more, less, share = ends
             varied.append((again(**{holder: more}), again(**{holder: less}), share))
     return varied
-
-
-def _targets(
-    load: float | _Several | None, depth: float | _Several | None
-) -> tuple[tuple[Target, ...], bool]:
-    """Return what is to be reached, and whether a list was asked for."""
-    if (load is None) == (depth is None):
-        problem = "Give either a load or a depth" + (", not both." if load is not None else ".")
-        raise InputError(problem, why="One follows from the other.")
-    values = np.asarray(load if depth is None else depth, dtype=np.float64)
-    if values.ndim > 1 or values.size == 0:
-        raise InputError(f"The loads or depths have shape {values.shape}; give a flat list.")
-    for value in values.flat:
-        require_positive("load" if depth is None else "depth", value, "N" if depth is None else "m")
-    kind = Load if depth is None else Depth
-    return tuple(kind(float(value)) for value in values.flat), values.ndim == 1
 
 
 def _rod_contact(film: ElasticFilm, rod: Rod, target: Target, friction: float) -> Contact:
