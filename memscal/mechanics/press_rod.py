@@ -76,7 +76,6 @@ def _midway(film: ElasticFilm, rod: Rod, load: float) -> Contact:
     return replace(sticks, inside=field, friction=math.nan, discretisation=middle)
 
 
-@lru_cache(maxsize=256)
 def is_tabulated(
     film: ElasticFilm, rod: RoundIndenter, load: float, friction: float | None = None
 ) -> bool:
