@@ -50,7 +50,7 @@ class TabulatedField:
     def base(self, r: FloatArray, order: int) -> FloatArray:
         """Return normal stress or outward traction at the base in Pa."""
         nodes = Wavenumbers.covering(self.k[-1], np.max(r, initial=self.radius))
-        return np.asarray(nodes.synthesise(self.spectrum(nodes.k, order), r, order=order))
+        return nodes.synthesise(self.spectrum(nodes.k, order), r, order=order)
 
     def _absent(self, *_: Any, **__: Any) -> NoReturn:
         raise InputError(

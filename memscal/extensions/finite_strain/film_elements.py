@@ -336,7 +336,7 @@ class FilmElements:
         import skfem
 
         element = skfem.ElementTriP2()
-        at_nodes = (np.asarray(element.doflocs).T, np.ones(6))
+        at_nodes = (element.doflocs.T, np.ones(6))
         displacement = skfem.Basis(self.mesh, element, quadrature=at_nodes)
         pressure = displacement.with_element(skfem.ElementTriP1())
         radius = np.asarray(displacement.global_coordinates())[0]

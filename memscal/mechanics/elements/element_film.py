@@ -212,7 +212,7 @@ def field_mesh(system: MixedSystem, solution: FloatArray, film: ElasticFilm) -> 
 
     # Outward and inward unknowns of the 15 nodes of each triangle, in the element's own order.
     dofs = system.displacement.element_dofs
-    local = np.asarray(skfem.ElementTriP4.doflocs)
+    local = skfem.ElementTriP4.doflocs
     outward = dofs[0::2]
     inward = dofs[1::2]
     nodes, index = np.unique(inward, return_inverse=True)
