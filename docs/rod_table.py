@@ -14,7 +14,8 @@ from pathlib import Path
 import numpy as np
 
 import memscal
-from memscal.extensions.finite_strain.solve import follow_depths
+from memscal.extensions.finite_strain.solve import Request
+from memscal.mechanics.solver.step import Depth
 from memscal.mechanics.tabulated_rod import FILE
 
 POISSON = (0.45, 0.475, 0.49, 0.5)
@@ -55,9 +56,9 @@ def make_column(job: tuple[Path, Key]) -> None:
     if sticking:
         way = steps_to(depths, max(STEP * radius, SHORTEST))
         finer = FINER_BELOW_THIN if radius <= THIN else FINER
-    contacts = follow_depths(
-        film, rod, [d * THICKNESS for d in way], sticking=sticking, finer=finer
-    )
+    # In mm, on a film of 12.5 thicknesses, as far as it goes.
+    goals = [Depth(1e3 * depth * THICKNESS) for depth in way]
+    contacts = Request(film, rod, goals, sticking, 12.5e3 * THICKNESS, None, finer).reached(1.0)
     for depth, contact in zip(way, contacts, strict=False):
         if depth not in depths:
             continue

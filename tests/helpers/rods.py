@@ -7,7 +7,8 @@ import pytest
 from helpers import paper
 
 from memscal import Rod
-from memscal.extensions.finite_strain.solve import follow_depths
+from memscal.extensions.finite_strain.solve import Request
+from memscal.mechanics.solver.step import Depth
 from memscal.mechanics.tabulated_rod import tabulated_rod
 
 H = 2e-3
@@ -23,7 +24,8 @@ def compare_with_the_table(nu: float, radius: float, depths: list[float], sticki
     if sticking:  # what touches stays: short steps, and elements finer than the table's
         way = np.union1d(way, np.arange(1, 25 * depths[-1] / radius) * radius / 25)
     finer = (2.5, 2.5) if sticking else (1.0, 1.0)
-    states = follow_depths(film, rod, list(way * H), sticking=sticking, finer=finer)
+    goals = [Depth(1e3 * depth * H) for depth in way.tolist()]
+    states = Request(film, rod, goals, sticking, 12.5e3 * H, None, finer).reached(1.0)
     for state in (s for d, s in zip(way, states, strict=True) if d in depths):
         tabulated = tabulated_rod(film, rod, state.load, sticking=sticking)
         largest = float(state.base_stress(0.0))

@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import cached_property, lru_cache
-from typing import Any
 
 import numpy as np
 
@@ -16,7 +15,6 @@ from memscal.axisymmetry.hankel import gauss_between, hankel_transform, radial_s
 from memscal.errors import ConvergenceError, DomainError
 from memscal.extensions.finite_strain.film_elements import (
     FilmElements,
-    FilmSize,
     Finer,
     Rubber,
     mesh_below_a_rod,
@@ -117,7 +115,7 @@ def solve_finite_strain(
     # Under a rod that sticks a point stays where it first touched, also at the rounded edge and at
     # the wall; under a sphere that sticks nothing in the contact moves radially.
     goals = [t if isinstance(t, Load) else Depth(t.value * _MM) for t in targets]
-    request = _Request(film, indenter, goals, sticking, radius * _MM, edge)
+    request = Request(film, indenter, goals, sticking, radius * _MM, edge)
     task = Task("the loading", 1.0)
     rough = () if request.path_dependent else tuple(request.reached(refinement / _ROUGHER))
     coarse = tuple(
@@ -130,17 +128,8 @@ def solve_finite_strain(
     )
 
 
-def follow_depths(
-    film: ElasticFilm, rod: Rod, depths: Sequence[float], *, sticking: bool, finer: Finer = (1, 1)
-) -> Iterator[Contact]:
-    """Yield a rod at growing depths (m) as far as it goes, on one mesh: of unknown convergence."""
-    goals = [Depth(depth * _MM) for depth in depths]
-    radius = _FREE_EDGE * film.thickness * _MM
-    return _Request(film, rod, goals, sticking, radius, None, finer).reached(1.0)
-
-
 @value_record
-class _Request:
+class Request:
     """What is asked for, in mm and N."""
 
     film: ElasticFilm
@@ -197,43 +186,35 @@ class _Request:
     def _pressing(self, refinement: float, coarse: Sequence[Contact]) -> Pressing:
         """Return film and indenter, on a mesh made for them."""
         size = (self.film.thickness * _MM, self.radius, refinement)
+        radius = self.indenter.radius * _MM
         if isinstance(self.indenter, Rod):
-            face, mesh = self._below_rod(size)
+            # The mesh is finest where the rod's edge folds the surface.
+            face = Face(radius, _EDGE * radius if self.edge is None else self.edge * _MM)
+            finest = _FINEST_SLIDING
+            inner, outer = _FOLD_SLIDING
+            if self.sticking:
+                finest = _FINEST_STICKING
+                inner, outer = _FOLD_STICKING
+                outer += _DRAWN_IN * max(map(self._depth, self.goals)) / radius
+            fold = (inner * radius, outer * radius)
+            mesh = mesh_below_a_rod(
+                size, rod=radius, fold=fold, finest=finest * face.edge, finer=self.finer
+            )
         else:
-            face, mesh = self._below_sphere(size, coarse)
+            face = Face(radius, radius)
+            widest = max(map(self._hertz_radius, self.goals))
+            if coarse:  # now it is known
+                widest = 1.1 * max(contact.contact_radius for contact in coarse) * _MM
+            if widest > min(self.radius / 2, 0.9 * radius):
+                raise DomainError(
+                    f"The contact would be up to {widest:.3g} mm wide, but the film's radius is "
+                    f"{self.radius:g} mm and the sphere's {radius:g} mm.",
+                    why="It must end well within both.",
+                )
+            mesh = mesh_below_a_sphere(size, contact=widest)
         elements = FilmElements(mesh, Rubber.of(self.film))
         upright = isinstance(self.indenter, Sphere) and self.sticking
         return Pressing(elements, face, self.sticking, upright=upright)
-
-    def _below_rod(self, size: FilmSize) -> tuple[Face, Any]:
-        """Return the rod's face, and a mesh that is finest where its edge folds the surface."""
-        rod = self.indenter.radius * _MM
-        face = Face(rod, _EDGE * rod if self.edge is None else self.edge * _MM)
-        finest = _FINEST_SLIDING
-        inner, outer = _FOLD_SLIDING
-        if self.sticking:
-            finest = _FINEST_STICKING
-            inner, outer = _FOLD_STICKING
-            outer += _DRAWN_IN * max(map(self._depth, self.goals)) / rod
-        fold = (inner * rod, outer * rod)
-        return face, mesh_below_a_rod(
-            size, rod=rod, fold=fold, finest=finest * face.edge, finer=self.finer
-        )
-
-    def _below_sphere(self, size: FilmSize, coarse: Sequence[Contact]) -> tuple[Face, Any]:
-        """Return the sphere's face, and a mesh that is fine below the contact."""
-        radius = self.indenter.radius * _MM
-        face = Face(radius, radius)
-        widest = max(map(self._hertz_radius, self.goals))
-        if coarse:  # now it is known
-            widest = 1.1 * max(contact.contact_radius for contact in coarse) * _MM
-        if widest > min(self.radius / 2, 0.9 * face.radius):
-            raise DomainError(
-                f"The contact would be up to {widest:.3g} mm wide, but the film's radius is "
-                f"{self.radius:g} mm and the sphere's {face.radius:g} mm.",
-                why="It must end well within both.",
-            )
-        return face, mesh_below_a_sphere(size, contact=widest)
 
     def _depth(self, goal: Target) -> float:
         """Return a rod's depth at a goal, that on a half-space at a load, in mm."""
