@@ -10,7 +10,7 @@ active set: a node that is pulled leaves, and one that lies inside the indenter 
 
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -323,14 +323,14 @@ def work(states: list[Pressed]) -> float:
     return float(weights @ (path(places)[:, 1] * path(places, 1)[:, 0]))
 
 
+@dataclass(eq=False)
 class Path:
     """The states so far, and the length of the next step; goals are loads in N or depths in mm."""
 
-    def __init__(self, pressing: Pressing, start: Pressed) -> None:
-        self.pressing = pressing
-        self.start = start
-        self.length = np.inf
-        self.states: list[Pressed] = []
+    pressing: Pressing
+    start: Pressed
+    length: float = np.inf
+    states: list[Pressed] = field(default_factory=list)
 
     def reach(self, goal: Target, guesses: Iterable[Pressed]) -> Iterator[float]:
         """Go to a goal, at once from a good guess; yield the share of the way after each step."""
