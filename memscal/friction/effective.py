@@ -112,14 +112,13 @@ class FrictionFit:
     ) -> BoundedEstimate:
         """Return the best coefficient with its interval; its budget by the slope at its value."""
         family = self.channel.family
-        last = family.values[-1]
         estimate = profile_estimate(
             along.values,
             along.coordinates,
             deviance,
             chi_square,
             family.scale,
-            reason=lambda interval: friction_reason(interval, last),
+            reason=friction_reason,
         )
         budget = {}
         if estimate.value is not None:

@@ -22,7 +22,7 @@ def profile_estimate(
     chi_square: FloatArray,
     scale: float,
     *,
-    reason: Callable[[Interval], str],
+    reason: Callable[[Interval, float], str],  # of the interval, and of the last value
     two_sided: bool = False,
     unit: str = "",
 ) -> BoundedEstimate:
@@ -58,9 +58,8 @@ def profile_estimate(
             spread = (narrow.high - narrow.low) / 2
     least = float(CubicSpline(coordinates, chi_square)(best))
     above = deviance - lowest + least
-    return BoundedEstimate(
-        value, spread, interval, reason(interval), values, above, least, unit=unit
-    )
+    words = reason(interval, values[-1])
+    return BoundedEstimate(value, spread, interval, words, values, above, least, unit=unit)
 
 
 def friction_reason(interval: Interval, last: float) -> str:

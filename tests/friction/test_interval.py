@@ -13,13 +13,9 @@ def value_at(t):
 
 
 def estimate(chi_square, last=np.inf):
+    values = np.array([*map(value_at, COORDINATES[:-1]), last])
     return profile_estimate(
-        np.array([value_at(t) for t in COORDINATES]),
-        COORDINATES,
-        chi_square,
-        chi_square,
-        0.3,
-        reason=lambda interval: friction_reason(interval, last),
+        values, COORDINATES, chi_square, chi_square, 0.3, reason=friction_reason
     )
 
 
