@@ -359,8 +359,13 @@ class FamilySetup:
         nominal, *sides = self._solved(groups)
         spectra = nominal["spectra"]
         by_length = np.zeros_like(spectra)
-        if lengths is not None:
-            by_length = _by_log_value(spectra, *lengths)
+        if lengths is not None and lengths[0].size > 1:
+            from scipy.interpolate import PchipInterpolator
+
+            # By the logarithm of the length: t (1 - t) times that by the bounded coordinate t.
+            t = bounded(*lengths)
+            slopes = PchipInterpolator(t, spectra, axis=0)(t, 1)
+            by_length = (t * (1 - t))[:, None, None] * slopes
         # Changes by one stated standard uncertainty, by the scales of the contact, from derivatives
         # by the logarithms of load, wavenumber and length of the interface:
         # docs/contact_families.md.
@@ -418,15 +423,3 @@ def parameter_values(what: str, values: Sequence[float]) -> FloatArray:
             cure="Sort them, and give each once.",
         )
     return checked
-
-
-def _by_log_value(spectra: FloatArray, values: FloatArray, scale: float) -> FloatArray:
-    r"""Return :math:`t(1-t)\,\partial/\partial t`: the derivatives by the value's logarithm."""
-    if values.size == 1:
-        return np.zeros_like(spectra)
-    from scipy.interpolate import PchipInterpolator
-
-    t = bounded(values, scale)
-    slopes = PchipInterpolator(t, spectra, axis=0)(t, 1)
-    stretch = t * (1 - t)
-    return stretch[:, None, None] * slopes

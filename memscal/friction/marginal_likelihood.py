@@ -21,7 +21,6 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 from scipy.special import logsumexp
 
-from memscal.friction.family import bounded
 from memscal.model.arrays import ArrayFunction, ArrayPair, FloatArray
 
 #: Paths through the loads along which a parameter of each load is drawn: a power of two.
@@ -111,11 +110,6 @@ def _compressed(loads: Sequence[Statistics]) -> list[Statistics]:
 
 Prior: TypeAlias = ArrayFunction
 """The share of a prior below values of a parameter that is not negative."""
-
-
-def bounded_prior(scale: float) -> Prior:
-    """Return the prior that is uniform in the bounded coordinate about a ``scale``."""
-    return lambda values: bounded(values, scale)
 
 
 def log_uniform_prior(low: float, high: float) -> Prior:

@@ -36,7 +36,6 @@ from memscal.friction.marginal_likelihood import (
     Prior,
     Statistics,
     added,
-    bounded_prior,
     evidence_of_each,
     log_likelihood,
     log_uniform_prior,
@@ -72,7 +71,8 @@ def weigh_slip_length(
     rigid: Channel, slipping: Channel, *, macroscopic: float, lubrication: str = "dry"
 ) -> LawComparison:
     """Weigh a slip length (``slipping``) against effective coefficients of a rigid interface."""
-    friction_prior = bounded_prior(rigid.family.scale)
+    # Uniform in the bounded coordinate.
+    friction_prior = partial(bounded, scale=rigid.family.scale)
     length_prior = log_uniform_prior(*_SLIP_LENGTHS)
     degrees = sum(points.degrees for points in rigid.points)
     name = "effective Amontons, one coefficient"
@@ -379,7 +379,7 @@ def interface_length(along: LawCurve, family: ProfileFamily, what: str) -> Bound
         -2 * along.log_likelihood / WIDENED**2,
         along.chi_square,
         family.scale,
-        reason=lambda interval: _length_reason(what, interval, family.values[-1]),
+        reason=partial(_length_reason, what),
         two_sided=True,
         unit="m",
     )

@@ -1,14 +1,16 @@
 """Evidence against closed forms: Gaussians are integrated exactly, whatever is free in them."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
 from memscal import BayesFactor
 from memscal.extensions.interface_laws.model_comparison import LawCurve, one_of_all
+from memscal.friction.family import bounded
 from memscal.friction.marginal_likelihood import (
     Statistics,
-    bounded_prior,
     evidence_of_each,
     log_likelihood,
     log_uniform_prior,
@@ -130,7 +132,7 @@ def test_a_decade_more_that_the_data_exclude_costs_its_share_of_the_evidence():
 
 @pytest.mark.parametrize(
     "prior",
-    [bounded_prior(0.3), log_uniform_prior(0.01, 10)],
+    [partial(bounded, scale=0.3), log_uniform_prior(0.01, 10)],
     ids=["bounded", "log-uniform"],
 )
 def test_a_prior_is_shared_out_among_cells_and_adds_up_to_one(prior):
