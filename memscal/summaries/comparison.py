@@ -40,7 +40,6 @@ from memscal.summaries.table import (
 
 def mapping(comparison: FrictionComparison) -> Values:
     """Return what ``compare --json`` prints but for the files that it was given and wrote."""
-    tested = comparison.measured.noise_stated
     whole: Values = {"schema_version": "1"}
     whole["scans"] = [
         file_json(scan.source) | {"lubrication": scan.lubrication}
@@ -48,7 +47,7 @@ def mapping(comparison: FrictionComparison) -> Values:
     ]
     whole["loads"] = [_load(comparison, i) for i in range(len(comparison.measured.profiles))]
     whole["joint"] = [
-        {"lubrication": lubrication, "loading": loading, **_estimate(estimate, tested)}
+        {"lubrication": lubrication, "loading": loading, **_estimate(comparison, estimate)}
         for lubrication, loading, estimate in _joint(comparison)
     ]
     if not comparison.by_shear:
@@ -77,24 +76,26 @@ def frame(comparison: FrictionComparison) -> DataFrame:
     import pandas as pd
 
     rows = []
-    tested = comparison.measured.noise_stated
     for loading in comparison.loadings:
         for i, profile in enumerate(comparison.measured.profiles):
             row = {"loading": loading, **columns(records.COMPARED_LOAD, profile)}
             if comparison.by_shear:
-                row |= _columns("friction", comparison.by_shear[loading][i], tested)
+                row |= _columns("friction", comparison, comparison.by_shear[loading][i])
             else:
                 load = comparison.loads[loading][i]
                 row |= columns(records.COMPARED_MAXIMA, load)
                 row["bracketed"] = load.bracketed
-                row |= _columns("friction by maximum", load.by_maximum, tested)
-                row |= _columns("friction by profile", load.by_profile, tested)
+                row |= _columns("friction by maximum", comparison, load.by_maximum)
+                row |= _columns("friction by profile", comparison, load.by_profile)
             rows.append(row)
     return pd.DataFrame(rows)
 
 
-def _columns(name: str, estimate: BoundedEstimate, tested: bool) -> dict[str, float]:
+def _columns(
+    name: str, comparison: FrictionComparison, estimate: BoundedEstimate
+) -> dict[str, float]:
     """Return the columns of one estimate in a data frame."""
+    tested = comparison.measured.noise_stated
     value = estimate.value
     u = estimate.standard_uncertainty
     return {
@@ -157,11 +158,10 @@ def file_json(source: SourceFile | None) -> Values:
 
 def _load(comparison: FrictionComparison, index: int) -> Values:
     """Return what is compared of one load, by the loading."""
-    tested = comparison.measured.noise_stated
     profile = comparison.measured.profiles[index]
     if comparison.by_shear:
         by_loading = {
-            loading or "given": _estimate(loads[index], tested)
+            loading or "given": _estimate(comparison, loads[index])
             for loading, loads in comparison.by_shear.items()
         }
         held = members(records.STRESS_NUMBERS.quantities[:1], profile)
@@ -180,7 +180,6 @@ def _load(comparison: FrictionComparison, index: int) -> Values:
 
 def _by_loading(comparison: FrictionComparison, load: LoadComparison) -> Values:
     """Return what one load says of each coefficient, by one loading."""
-    tested = comparison.measured.noise_stated
     profiles = []
     for i, mu in enumerate(comparison.friction):
         calculated = {
@@ -194,8 +193,8 @@ def _by_loading(comparison: FrictionComparison, load: LoadComparison) -> Values:
         profiles.append(members(records.CALCULATED, None, **calculated))
     return {
         "effective_friction_coefficient": {
-            "by_maximum": _estimate(load.by_maximum, tested),
-            "by_profile": _estimate(load.by_profile, tested),
+            "by_maximum": _estimate(comparison, load.by_maximum),
+            "by_profile": _estimate(comparison, load.by_profile),
         },
         "bracketed": finite(load.bracketed),
         "degrees": load.degrees,
@@ -203,10 +202,10 @@ def _by_loading(comparison: FrictionComparison, load: LoadComparison) -> Values:
     }
 
 
-def _estimate(estimate: BoundedEstimate, tested: bool) -> Values:
+def _estimate(comparison: FrictionComparison, estimate: BoundedEstimate) -> Values:
     """Return an estimate with its fit and its profile likelihood."""
     # An estimated noise is as large as the misfit: a chi-square by it tests nothing.
-    fit = {} if tested else {"least": None, "p_value": None}
+    fit = {} if comparison.measured.noise_stated else {"least": None, "p_value": None}
     return {
         **bounded_json(records.FRICTION, estimate),
         **members(records.ESTIMATE_FIT, estimate, **fit),
@@ -353,9 +352,8 @@ def _labels(number: int, profile: MeasuredProfile) -> tuple[str, str, str]:
 
 def _friction_table(comparison: FrictionComparison, loading: str) -> Table:
     """Return the coefficient of each load and of all loads of a kind, by one loading."""
-    tested = comparison.measured.noise_stated
     with_shear = comparison.shear is not None and not comparison.by_shear
-    tests = ["χ²/ν", "p"] if tested else []
+    tests = ["χ²/ν", "p"] if comparison.measured.noise_stated else []
     head = ["by the maximum", "by the profile", *tests, "bracketed"]
     if comparison.by_shear:
         head = ["by the shear", *tests]
@@ -374,7 +372,7 @@ def _friction_table(comparison: FrictionComparison, loading: str) -> Table:
             name = lubrication or "not stated"
             name += " + lubricated" if joint.beside else ""
             name += ", with shear" if with_shear else ""
-            cells = [str(joint), *_fit(joint, tested)]
+            cells = [str(joint), *_fit(comparison, joint)]
             rows.append(["", name, "all", *(cells if comparison.by_shear else ["", *cells, ""])])
     way = f"{loading} loading" if loading else "profiles as given"
     title = f"Effective friction coefficient, {way} [{level} interval]"
@@ -383,18 +381,17 @@ def _friction_table(comparison: FrictionComparison, loading: str) -> Table:
 
 def _readings(comparison: FrictionComparison, loading: str, index: int) -> list[str]:
     """Return the coefficient of one load, with its fit."""
-    tested = comparison.measured.noise_stated
     if comparison.by_shear:
         estimate = comparison.by_shear[loading][index]
-        return [str(estimate), *_fit(estimate, tested)]
+        return [str(estimate), *_fit(comparison, estimate)]
     load = comparison.loads[loading][index]
-    fit = _fit(load.by_profile, tested)
+    fit = _fit(comparison, load.by_profile)
     return [str(load.by_maximum), str(load.by_profile), *fit, f"{100 * load.bracketed:.0f} %"]
 
 
-def _fit(estimate: BoundedEstimate, tested: bool) -> tuple[str, ...]:
+def _fit(comparison: FrictionComparison, estimate: BoundedEstimate) -> tuple[str, ...]:
     """Return the reduced chi-square and its p value, where they test anything."""
-    if not tested:
+    if not comparison.measured.noise_stated:
         return ()
     if estimate.degrees <= 0:
         return "", ""
@@ -448,9 +445,7 @@ def _budget_table(comparison: FrictionComparison) -> Table:
 
 def _share(value: float | None) -> str:
     """Return a contribution with two digits."""
-    if value is None:
-        return "-"
-    return "0" if value == 0 else f"{value:.2g}"
+    return "-" if value is None else f"{value:.2g}"
 
 
 def _macroscopic_table(comparison: FrictionComparison) -> Table:
@@ -484,7 +479,7 @@ def _lubrication_table(comparison: FrictionComparison) -> Table:
 
 def friction_name(friction: float) -> str:
     """Return a friction coefficient as it is typed: ``0.15`` or ``inf``."""
-    return "inf" if math.isinf(friction) else f"{friction:.4g}"
+    return f"{friction:.4g}"
 
 
 def bounded_json(quantity: Quantity, estimate: BoundedEstimate) -> Values:
