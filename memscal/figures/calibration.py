@@ -260,7 +260,15 @@ def calibration_figure(result: Calibrated) -> Figure:
         _write_lines(figure, lines)
         figure.add_subplot(outer[0, :]).set_axis_off()
         scan_panels = _draw_scan_panels(figure, outer[1, 0], data, loads)
-        panels = [*scan_panels, *_draw_g_panels(figure, outer[1, 1], data)]
+        grid = outer[1, 1].subgridspec(3, 1)
+        radial = figure.add_subplot(grid[0], label="radial")
+        radial_log = figure.add_subplot(grid[1], sharex=radial, label="radial_log")
+        transfer = figure.add_subplot(grid[2], label="transfer")
+        draw_radial(radial, data)
+        radial.tick_params(labelbottom=False)
+        draw_radial_log(radial_log, data)
+        draw_transfer(transfer, data)
+        panels = [*scan_panels, radial, radial_log, transfer]
         if mapped:
             panels += _draw_maps(figure, outer[2, :], data, mapped)
         panel_letters(panels)
@@ -288,19 +296,6 @@ def _draw_scan_panels(
     for axes in (*scans, residuals):
         axes.tick_params(labelbottom=False)
     return [scan, residuals, scan_log]
-
-
-def _draw_g_panels(figure: Figure, place: SubplotSpec, data: ApparatusData) -> list[Axes]:
-    """Draw G, G on a logarithmic axis, and the transfer function."""
-    grid = place.subgridspec(3, 1)
-    radial = figure.add_subplot(grid[0], label="radial")
-    radial_log = figure.add_subplot(grid[1], sharex=radial, label="radial_log")
-    transfer = figure.add_subplot(grid[2], label="transfer")
-    draw_radial(radial, data)
-    radial.tick_params(labelbottom=False)
-    draw_radial_log(radial_log, data)
-    draw_transfer(transfer, data)
-    return [radial, radial_log, transfer]
 
 
 def values_text(data: ApparatusData) -> str:

@@ -1,8 +1,7 @@
 """Figures of a comparison of measured with calculated stress."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from functools import partial
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -123,17 +122,13 @@ def _name_curves(axes: Axes, loads: list[float], curves: Mapping[float, FloatArr
         height = np.mean(group[:, 0])
         low = group[:, 1].min()
         high = group[:, 1].max()
-        name = _name_of_range(low, high)
+        name = f"≥ {low:.3g}" if np.isinf(high) else f"{low:.3g}–{high:.3g}"
+        if low == high:
+            name = friction_name(low)
         if group is groups[-1]:
             sign = "" if low < high == np.inf else "= "
             name = rf"$\mu$ {sign}{name}"
         axes.annotate(name, (x, height), color=friction_colour(high), **look)
-
-
-def _name_of_range(low: float, high: float) -> str:
-    if low == high:
-        return friction_name(low)
-    return f"≥ {low:.3g}" if np.isinf(high) else f"{low:.3g}–{high:.3g}"
 
 
 def _apart(axes: Axes, curves: Mapping[float, FloatArray], end: int) -> list[FloatArray]:
@@ -216,24 +211,20 @@ def _draw_effective(axes: Axes, comparison: FrictionComparison, loads: Loads) ->
             look = mark(at_load.lubrication, colour)
             _draw_reading(axes, getattr(at_load, name), x, words if i == 0 else "", look)
     joint = joint_estimate(comparison, loads)
-    green = REFERENCE
-    axes.axhspan(*interval_ends(joint), color=green, alpha=0.18, lw=0, label="all loads, 95 %")
+    label = "all loads, 95 %"
+    axes.axhspan(*interval_ends(joint), color=REFERENCE, alpha=0.18, lw=0, label=label)
     if joint.value is not None:
-        axes.axhline(float(friction_position(joint.value)), color=green, lw=0.8)
+        axes.axhline(float(friction_position(joint.value)), color=REFERENCE, lw=0.8)
     if comparison.macroscopic is not None:
-        _draw_macroscopic(axes, *comparison.macroscopic)
+        value, u = comparison.macroscopic
+        label = "macroscopic, ±2u" if u else "macroscopic"
+        axes.axhline(float(friction_position(value)), color=MUTED, lw=0.8, ls="--", label=label)
+        if u:
+            spread = EXPANDED * u
+            low, high = friction_position([max(value - spread, 0.0), value + spread])
+            axes.axhspan(low, high, color=MUTED, alpha=0.15, lw=0)
     friction_axis(axes, "y")
     axes.set(xlim=(0, loads[-1].load + 0.08 * span), xlabel="load (N)")
-
-
-def _draw_macroscopic(axes: Axes, value: float, u: float | None) -> None:
-    grey = MUTED
-    label = "macroscopic, ±2u" if u else "macroscopic"
-    axes.axhline(float(friction_position(value)), color=grey, lw=0.8, ls="--", label=label)
-    if u:
-        spread = EXPANDED * u
-        low, high = friction_position([max(value - spread, 0.0), value + spread])
-        axes.axhspan(low, high, color=grey, alpha=0.15, lw=0)
 
 
 def _draw_reading(axes: Axes, reading: BoundedEstimate, x: float, label: str, look: Values) -> None:
@@ -280,38 +271,30 @@ def _panels(
                 words = lubricated_words(lubrication) + (f", {loading} loading" if loading else "")
                 axes.set_title(words, fontsize=8, loc="left")
                 axes.label_outer()
-        names = dict.fromkeys(name for _, name in comparison_looks(comparison).values())
-        _one_legend(figure, panels.flat, list(names))
+        # The entries of all panels stand above them, each label once, those of loads first.
+        entries: Values = {}
+        for axes in panels.flat:
+            for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
+                entries.setdefault(label, handle)
+        first = dict.fromkeys(name for _, name in comparison_looks(comparison).values())
+        order = [label for label in first if label in entries]
+        order += [label for label in entries if label not in first]
+        handles = [entries[label] for label in order]
+        figure.legend(handles, order, loc="outside upper center", ncols=min(len(order), 7))
     return figure
-
-
-def _one_legend(figure: Figure, panels: Iterable[Axes], first: Sequence[str]) -> None:
-    """Put the entries of all panels above them, each label once, in order after the first."""
-    entries: Values = {}
-    for axes in panels:
-        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
-            entries.setdefault(label, handle)
-    order = [label for label in first if label in entries]
-    order += [label for label in entries if label not in first]
-    handles = [entries[label] for label in order]
-    figure.legend(handles, order, loc="outside upper center", ncols=min(len(order), 7))
 
 
 def _draw_likelihood(axes: Axes, comparison: FrictionComparison, loads: Loads) -> None:
     """Draw chi-square above its least value against the coefficient: the profile likelihoods."""
     looks = comparison_looks(comparison)
-    for at_load in loads:
-        colour, name = looks[at_load.load]
-        _draw_rise(axes, at_load.by_profile, color=colour, lw=1.0, label=name)
-    joint = joint_estimate(comparison, loads)
-    _draw_rise(axes, joint, color=MEASURED, lw=1.8, label="all loads")
+    curves = [(at_load.by_profile, *looks[at_load.load], 1.0) for at_load in loads]
+    curves.append((joint_estimate(comparison, loads), MEASURED, "all loads", 1.8))
+    for reading, colour, name, width in curves:
+        place = friction_position(reading.values)
+        axes.plot(place, deviance_rise(reading), color=colour, lw=width, label=name)
     draw_levels(axes)
     friction_axis(axes, "x")
     axes.set_ylabel(RISE)
-
-
-def _draw_rise(axes: Axes, reading: BoundedEstimate, **look: Any) -> None:
-    axes.plot(friction_position(reading.values), deviance_rise(reading), **look)
 
 
 def draw_levels(axes: Axes) -> None:

@@ -1,6 +1,6 @@
 """Measured stress profiles beside calculated ones, and what all figures of friction share."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import matplotlib as mpl
 import numpy as np
@@ -190,23 +190,15 @@ def draw_profiles(
         _draw_points(axes, at_load, colour, "" if logarithmic else name, logarithmic)
     axes.set_ylabel("blurred stress $S_{zz}$ (kPa)")
     if logarithmic:
-        _finish_logarithmic(axes, loads, styles)
-    else:
-        _finish_linear(axes, loads, styles)
-
-
-def _finish_logarithmic(axes: Axes, loads: Loads, styles: Mapping[str, str]) -> None:
-    top = max(at_load.profile.s_zz.max() for at_load in loads) / KPA
-    axes.set_yscale("log")
-    axes.set_ylim(top * 10**-_DECADES, 2.0 * top)
-    for ls, label in styles.items():
-        axes.plot([], [], color="0.3", lw=1.0, ls=ls, label=label)
-    pale = mark(loads[0].lubrication, "0.3") | {"ls": "none", "ms": 3.0, "alpha": 2 * _PALE}
-    axes.plot([], [], label="pale: less than 2u", **pale)
-    legend_above(axes)
-
-
-def _finish_linear(axes: Axes, loads: Loads, styles: Mapping[str, str]) -> None:
+        top = max(at_load.profile.s_zz.max() for at_load in loads) / KPA
+        axes.set_yscale("log")
+        axes.set_ylim(top * 10**-_DECADES, 2.0 * top)
+        for ls, label in styles.items():
+            axes.plot([], [], color="0.3", lw=1.0, ls=ls, label=label)
+        pale = mark(loads[0].lubrication, "0.3") | {"ls": "none", "ms": 3.0, "alpha": 2 * _PALE}
+        axes.plot([], [], label="pale: less than 2u", **pale)
+        legend_above(axes)
+        return
     draw_zero(axes)
     axes.set_xlim(0, max(at_load.profile.r[-1] for at_load in loads) / MM)
     lines = [lubricated_words(loads[0].lubrication)]

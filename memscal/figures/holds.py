@@ -27,13 +27,12 @@ def holds_figure(holds: Holds) -> Figure:
     every = math.ceil(holds.line.size / _MOST_ROWS)
     first = holds.line[holds.first]
     last = holds.line[holds.stop - 1]
-    gold = GAUSSIAN
     with panels_of(1.6 * (len(shown) + 1.4), len(shown) + 1) as (figure, panels):
         for axes, name in zip(panels, shown, strict=False):
             label, scale = names[name]
             log = holds.log[name] / scale
             axes.plot(holds.line[::every], log[::every], color="0.6", lw=0.7)
-            axes.hlines(holds.mean[name] / scale, first, last, color=gold, lw=2.5, zorder=3)
+            axes.hlines(holds.mean[name] / scale, first, last, color=GAUSSIAN, lw=2.5, zorder=3)
             axes.set_ylabel(label)
             axes.sharex(panels[0])
         title = f"{first.size} holds (thick) in {holds.line.size} rows of the log"

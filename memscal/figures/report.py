@@ -96,23 +96,18 @@ def html_report(result: Result) -> str:
         "Provenance": _html(_provenance(report)),
     }
     title = escape(report.title)
-    body = [f"<h1>{title}</h1>", *_verdict(result, report)]
+    body = [f"<h1>{title}</h1>"]
+    found = report.verdict or result.answer()
+    if found:
+        failed = report.failed or not all(check.passed for check in report.checks)
+        kind = "verdict failed" if failed else "verdict"
+        lines = "<br>\n".join(escape(found).splitlines())
+        body.append(f'<p class="{kind}" role="note">{lines}</p>')
     for heading, content in sections.items():
         if content:
             body.append(f"<section>\n<h2>{heading}</h2>\n{content}\n</section>")
     page = Template(_PAGE.read_text(encoding="utf-8"))
     return page.substitute(title=title, body="\n".join(body), program=f"memscal {__version__}")
-
-
-def _verdict(result: Result, report: Report) -> list[str]:
-    """Return the paragraph that says what was found, if there is one."""
-    text = report.verdict or result.answer()
-    if not text:
-        return []
-    failed = report.failed or not all(check.passed for check in report.checks)
-    kind = "verdict failed" if failed else "verdict"
-    lines = "<br>\n".join(escape(text).splitlines())
-    return [f'<p class="{kind}" role="note">{lines}</p>']
 
 
 def _html(tables: Sequence[Table]) -> str:

@@ -62,7 +62,22 @@ def measured_stress_figure(measured: MeasuredStress) -> Figure:
         logarithmic.set_yscale("log")
         logarithmic.set_ylim(_DECADES * top, 1.6 * top)
         logarithmic.yaxis.set_major_formatter("{x:g}")
-        _legend(figure, measured, dict(looks.values()), many=many)
+        # Loads by colour and states by mark, once for both panels.
+        handles = []
+        for colour, name in dict.fromkeys(looks.values()):
+            handles.append(Line2D([], [], color=colour, lw=2.0, label=name))
+        for state in dict.fromkeys(profile.lubrication for profile in measured.profiles):
+            look = mark(state, "0.2")
+            words = state or "measured"
+            if many:
+                look["marker"] = "."
+            else:
+                words += ", ±2u"
+            dashes = "--" if state == "lubricated" else "-"
+            handles.append(Line2D([], [], lw=0.8, ms=3.2, ls=dashes, label=words, **look))
+        label = "contact radius, µ = 0"
+        handles.append(Line2D([], [], color="0.2", marker="|", ms=6, ls="none", label=label))
+        figure.legend(handles=handles, loc="outside upper center", ncols=min(len(handles), 7))
     return figure
 
 
@@ -85,26 +100,6 @@ def _draw(axes: Axes, profile: MeasuredProfile, colour: str, clear: BoolArray) -
     if not clear.all():
         draw_measured(axes, r[~clear], stress[~clear], None, alpha=0.3, **look)
     axes.axvline(profile.contact_radius / MM, ymin=0.94, color=colour, lw=1.2, ls=dashes)
-
-
-def _legend(
-    figure: Figure, measured: MeasuredStress, colours: dict[str, str], *, many: bool
-) -> None:
-    """Name loads by colour and states by mark, once for both panels."""
-    handles = [Line2D([], [], color=colour, lw=2.0, label=name) for colour, name in colours.items()]
-    for state in dict.fromkeys(profile.lubrication for profile in measured.profiles):
-        look = mark(state, "0.2")
-        words = state or "measured"
-        if many:
-            look["marker"] = "."
-        else:
-            words += ", ±2u"
-        dashes = "--" if state == "lubricated" else "-"
-        handles.append(Line2D([], [], lw=0.8, ms=3.2, ls=dashes, label=words, **look))
-    handles.append(
-        Line2D([], [], color="0.2", marker="|", ms=6, ls="none", label="contact radius, µ = 0")
-    )
-    figure.legend(handles=handles, loc="outside upper center", ncols=min(len(handles), 7))
 
 
 _LEAST_LIMIT = 3.5
@@ -191,18 +186,15 @@ def contact_figure(contact: Contact, *, beside: Sequence[Contact] = ()) -> Figur
         _draw_interface(panels[0], contacts, colours)
         _draw_base(panels[1], contacts, colours)
         if several:
-            _draw_loads(panels[2], contacts, colours)
+            axes = panels[2]
+            depth = np.array([contact.depth for contact in contacts]) / _MICROMETRE
+            load = [contact.load for contact in contacts]
+            axes.plot(depth, load, color=MUTED, lw=0.8)
+            axes.scatter(depth, load, c=colours, s=14, zorder=3)
+            axes.set_ylim(bottom=0)
+            axes.set_xlim(left=min(0.0, 1.05 * depth.min()))
+            axes.set(xlabel="depth (µm)", ylabel="load (N)")
     return figure
-
-
-def _draw_loads(axes: Axes, contacts: Sequence[Contact], colours: Sequence[str]) -> None:
-    depth = np.array([contact.depth for contact in contacts]) / _MICROMETRE
-    load = [contact.load for contact in contacts]
-    axes.plot(depth, load, color=MUTED, lw=0.8)
-    axes.scatter(depth, load, c=colours, s=14, zorder=3)
-    axes.set_ylim(bottom=0)
-    axes.set_xlim(left=min(0.0, 1.05 * depth.min()))
-    axes.set(xlabel="depth (µm)", ylabel="load (N)")
 
 
 def _draw_interface(axes: Axes, contacts: Sequence[Contact], colours: Sequence[str]) -> None:

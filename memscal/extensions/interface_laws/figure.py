@@ -93,13 +93,12 @@ def _draw_implied(axes: Axes, implied: ImpliedFriction, measured: Sequence[LoadC
     low, best, high = friction_position(np.sort(implied.friction, axis=1)).T
     draw_band(axes, implied.loads, low, high)
     axes.plot(implied.loads, best, color=DECONVOLVED, label="what the slip length means")
-    black = MEASURED
     for i, at_load in enumerate(measured):
         reading = at_load.by_profile
         label = "found at each load" if i == 0 else "_found"
-        axes.plot([at_load.load] * 2, interval_ends(reading), color=black, lw=1.0, label=label)
+        axes.plot([at_load.load] * 2, interval_ends(reading), color=MEASURED, lw=1.0, label=label)
         if reading.value is not None:
-            axes.plot(at_load.load, friction_position(reading.value), "o", color=black, ms=4)
+            axes.plot(at_load.load, friction_position(reading.value), "o", color=MEASURED, ms=4)
     friction_axis(axes, "y")
     axes.set_xlabel("load (N)")
     axes.set_xlim(left=0)
