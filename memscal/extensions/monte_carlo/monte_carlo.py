@@ -3,7 +3,7 @@
 Each draw is a scan with new noise and other true inputs; it states the nominal ones.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property
 
@@ -17,7 +17,8 @@ from memscal.calibration.uncertainty import (
     BUDGETED,
     CURVATURE,
     NOT_RANDOM,
-    InputEffect,
+    Correlations,
+    Effects,
     correlation_matrix,
     drawn_about,
     expected_values,
@@ -59,8 +60,8 @@ class DrawnScans:
     """Model that turns random numbers into scans of a calibrated sensor, and calibrates them."""
 
     solution: Solution
-    effects: Mapping[str, InputEffect]
-    correlations: Mapping[tuple[str, str], float]
+    effects: Effects
+    correlations: Correlations
     seed: int
 
     def result(self, index: int) -> FloatArray | str:

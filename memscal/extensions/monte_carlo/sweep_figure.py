@@ -35,9 +35,18 @@ def sweep_figure(sweep: Sweep) -> Figure:
     )
     with panels_of(6.6, 3, note="", sharex=True) as (figure, panels):
         for axes, (label, exact, draws, size) in zip(panels, rows, strict=True):
-            _draw_row(axes, sweep.amplitude, exact / size, draws / size)
+            exact = exact / size
+            draws = np.where(np.isfinite(draws), draws / size, np.nan)
+            axes.set_xscale("log")
+            axes.axvline(1.0, color="0.5", lw=0.8, ls=":")
+            limits = _limits(exact, draws)
+            if np.any(np.isfinite(draws)):
+                _draw_seeds(axes, sweep.amplitude, draws, limits)
+            (line,) = axes.plot(sweep.amplitude, exact, "-o", color=DECONVOLVED, ms=4, zorder=4)
+            line.set_label("exact expectation")
+            axes.set_ylim(limits)
             if axes is not panels[2]:
-                _relative_axis(axes, sweep.amplitude, exact / size)
+                _relative_axis(axes, sweep.amplitude, exact)
             axes.set_ylabel(label)
         axes.set_xlabel("noise amplitude, relative to the one chosen by rule (1)")
         axes.set_xlim(0.85 * np.min(sweep.amplitude), 1.18 * np.max(sweep.amplitude))
@@ -47,18 +56,6 @@ def sweep_figure(sweep: Sweep) -> Figure:
         figure.draw_without_rendering()
         figure.set_layout_engine("none")
     return figure
-
-
-def _draw_row(axes: Axes, amplitude: FloatArray, exact: FloatArray, draws: FloatArray) -> None:
-    axes.set_xscale("log")
-    axes.axvline(1.0, color="0.5", lw=0.8, ls=":")
-    draws = np.where(np.isfinite(draws), draws, np.nan)
-    low, high = _limits(exact, draws)
-    if np.any(np.isfinite(draws)):
-        _draw_seeds(axes, amplitude, draws, (low, high))
-    (line,) = axes.plot(amplitude, exact, "-o", color=DECONVOLVED, ms=4, zorder=4)
-    line.set_label("exact expectation")
-    axes.set_ylim(low, high)
 
 
 def _draw_seeds(
