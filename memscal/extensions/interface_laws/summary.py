@@ -9,23 +9,21 @@ from memscal.summaries.comparison import bounded_json, friction_name
 from memscal.summaries.declared import members, plain
 from memscal.summaries.table import Table, texts_of
 
-_PER_LOAD = ("load",)
-
 _LAW = ("name", "best", "log_evidence", "log_likelihood", "numerical_error")
 _FACTOR = ("favoured", "against", "log_factor", "words", "log_likelihood_ratio")
 
 COMPARED_LAWS = (
     Quantity("lubrication", "text", "dry or lubricated"),
-    Quantity("loads", "force", "loads", axes=_PER_LOAD),
+    Quantity("loads", "force", "loads"),
 )
 
 _FRICTION = "effective_friction_coefficient"
 
 IMPLIED = (
-    Quantity("load", "force", "load", axes=_PER_LOAD),
-    Quantity("friction", "dimensionless", "effective coefficient", axes=_PER_LOAD, label=_FRICTION),
-    Quantity("pressure", "stress", "mean pressure", axes=_PER_LOAD, label="mean_pressure"),
-    Quantity("stiffness", "stress per length", "stiffness", axes=_PER_LOAD),
+    Quantity("load", "force", "load"),
+    Quantity("friction", "dimensionless", "effective coefficient", label=_FRICTION),
+    Quantity("pressure", "stress", "mean pressure", label="mean_pressure"),
+    Quantity("stiffness", "stress per length", "stiffness"),
 )
 """What a slip length means at one load; coefficient and stiffness with the ends of intervals."""
 
