@@ -3,6 +3,7 @@
 import math
 
 from memscal.extensions.planning.design import Design
+from memscal.friction.results import percent
 from memscal.model.arrays import Values
 from memscal.model.quantities import ESTIMATED, MM, MV, PER_MM, PER_MM2, Quantity, measured
 from memscal.model.records import RADIAL, TRANSFER
@@ -74,18 +75,14 @@ def _expected_rows(planned: Design) -> list[tuple[str, str, str, str]]:
         shown = ESTIMATED[name]
         value = f"{planned.parameters[name] / shown.scale:.4g} {shown.unit}"
         error = f"{planned.parameters.uncertainty(name) / shown.scale:.2g}"
-        rows.append((words, value, error, _percent(planned.relative_uncertainty(name))))
+        rows.append((words, value, error, percent(planned.relative_uncertainty(name))))
     g = planned.g[0] / PER_MM2
     u = planned.g_errors[0] / PER_MM2
-    rows.append(("G at the axis", f"{g:.4g} 1/mm^2", f"{u:.2g}", _percent(u / abs(g))))
+    rows.append(("G at the axis", f"{g:.4g} 1/mm^2", f"{u:.2g}", percent(u / abs(g))))
     band = planned.resolved_wavenumber / PER_MM
     detail = f"detail of {2 * math.pi / band:.3g} mm"
     rows.append(("resolved up to", f"{band:.4g} rad/mm", detail, ""))
     return rows
-
-
-def _percent(share: float) -> str:
-    return f"{share * 100:.3g} %"
 
 
 def _contributions_table(planned: Design) -> Table:
