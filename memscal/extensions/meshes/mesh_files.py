@@ -229,8 +229,8 @@ def read_mesh(path: FilePath) -> Mesh:
     """Read a mesh and its fields from a VTU, legacy VTK or XDMF file."""
     shown = os.fspath(path)
     name = os.path.basename(shown)
-    ending = os.path.splitext(shown)[1].lower()
-    if ending not in _KINDS:
+    kind = _KINDS.get(os.path.splitext(shown)[1].lower())
+    if kind is None:
         raise FormatError(
             f"{name} is not a mesh of a kind that is read.",
             why="Meshes are read from VTU (.vtu), legacy VTK (.vtk) and XDMF (.xdmf) files.",
@@ -243,12 +243,12 @@ def read_mesh(path: FilePath) -> Mesh:
         raise FormatError(f"{name} is empty.", cure="Save the mesh again.")
     sources = [SourceFile(name, hashlib.sha256(data).hexdigest())]
     heavy: ByName = {}
-    if _KINDS[ending] == "xdmf":
+    if kind == "xdmf":
         heavy, drawn = heavy_arrays(data, shown)
         sources += drawn
     with damage_named(f"{name} cannot be read as a mesh", why="Its reader gave no mesh back"):
-        header, arrays = run_meshio(data, _KINDS[ending], name, heavy)
-        return _checked(header, arrays, tuple(sources), tensor_order=_KINDS[ending] != "xdmf")
+        header, arrays = run_meshio(data, kind, name, heavy)
+        return _checked(header, arrays, tuple(sources), tensor_order=kind != "xdmf")
 
 
 def _checked(
