@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cached_property
-from typing import ClassVar, cast
+from typing import Any, ClassVar, cast
 
 import numpy as np
 import scipy.fft
@@ -84,18 +84,14 @@ class FieldModel(ForwardModel):
 
     def signal(self, geometry: Geometry, kernel: FloatArray) -> FloatArray:
         """Voltages for kernels in V/Pa by their transforms, shape (nodes,) or (nodes, m)."""
-        columns = np.empty((self.points.u.size, *kernel.shape[1:]))
-        for column, spectrum in zip(
-            np.atleast_2d(columns.T), self._on_cells(np.atleast_2d(kernel.T)), strict=True
-        ):
-            column[:] = self._read(geometry, spectrum)
-        return columns
+        voltages = self._read(geometry, self._on_cells(np.atleast_2d(kernel.T)))
+        return voltages.reshape(self.points.u.size, *kernel.shape[1:])
 
     def shift_derivative(self, geometry: Geometry, kernel: FloatArray) -> FloatArray:
         """Derivatives of :meth:`signal` by each point's centre, shape (2, n), in V/m."""
         (spectrum,) = self._on_cells(kernel[None])
         plane = self._plane
-        return np.stack([self._read(geometry, -1j * k * spectrum) for k in (plane.kx, plane.ky)])
+        return self._read(geometry, [-1j * k * spectrum for k in (plane.kx, plane.ky)]).T
 
     def elliptic(self, geometry: Geometry, ellipses: FloatArray) -> ArrayPair:
         """Responses (m, n) per A to (s, e1, e2), (m, 3); slopes (2, n) of the first by place."""
@@ -105,9 +101,8 @@ class FieldModel(ForwardModel):
         for sigma, e1, e2 in ellipses:
             square = (1 + e1) * kx**2 + 2 * e2 * kx * ky + (1 - e1) * ky**2
             kernels.append(np.exp(-0.5 * sigma**2 * square))
-        responses = [self._read(geometry, kernel) for kernel in kernels]
-        shift = [self._read(geometry, -1j * k * kernels[0]) for k in (kx, ky)]
-        return np.stack(responses), np.stack(shift)
+        shifts = [-1j * k * kernels[0] for k in (kx, ky)]
+        return self._read(geometry, kernels).T, self._read(geometry, shifts).T
 
     def around(
         self, m: int, cosines: FloatArray, sines: FloatArray, centres: FloatArray
@@ -118,8 +113,7 @@ class FieldModel(ForwardModel):
         even = np.cos(angle) * self._on_cells(cosines.T)
         odd = np.sin(angle) * self._on_cells(sines.T)
         spectra = (-1j) ** m * np.vstack([even, odd])
-        columns = [self._read(geometry, spectrum) for spectrum in spectra]
-        return np.stack(columns, axis=1)
+        return self._read(geometry, spectra)
 
     def spotted(self, places: FloatArray, width: float, centres: FloatArray) -> FloatArray:
         """Voltages of Gaussians of unit integral at places (2, m) from centres, in m: (n, m)."""
@@ -127,7 +121,7 @@ class FieldModel(ForwardModel):
         plane = self._plane
         apart = geometry.places[:, :, None] - places[::-1, None] / plane.spacing
         kernel = gaussian_transfer(np.hypot(plane.ky, plane.kx), width)
-        return self._read(replace(geometry, places=apart), kernel)
+        return self._read(replace(geometry, places=apart), [kernel])[..., 0]
 
     def _on_cells(self, kernels: FloatArray) -> FloatArray:
         """Interpolate kernels (m, nodes) to the cells of the plane."""
@@ -136,22 +130,23 @@ class FieldModel(ForwardModel):
         wavenumbers = np.hypot(self._plane.ky, self._plane.kx)
         return CubicSpline(self.k, kernels, axis=1)(wavenumbers)
 
-    def _read(self, geometry: Geometry, spectrum: FloatArray) -> FloatArray:
-        """Read voltages (n,) or (n, m) at the points for a kernel's transform on the cells."""
+    def _read(self, geometry: Geometry, spectra: Any) -> FloatArray:
+        """Read voltages (n, k) or (n, m, k) at the points for k transforms on the cells."""
         from scipy.ndimage import map_coordinates
 
         plane = self._plane
         places = cast(PlaneGeometry, geometry).places
-        values = np.zeros(places.shape[1:])
+        values = np.zeros((*places.shape[1:], len(spectra)))
         shape = (plane.count, plane.count)
+        whole = np.zeros((plane.count, plane.count // 2 + 1), dtype=complex)
         for scan, stress in enumerate(plane.stress):
             rows = self.points.scan == scan
-            whole = np.zeros((plane.count, plane.count // 2 + 1), dtype=complex)
-            whole[plane.cells] = spectrum * stress
-            splines = scipy.fft.irfft2(whole, s=shape)
-            values[rows] = map_coordinates(
-                splines, places[:, rows], order=5, mode="grid-wrap", prefilter=False
-            )
+            for i, spectrum in enumerate(spectra):
+                whole[plane.cells] = spectrum * stress
+                splines = scipy.fft.irfft2(whole, s=shape)
+                values[rows, ..., i] = map_coordinates(
+                    splines, places[:, rows], order=5, mode="grid-wrap", prefilter=False
+                )
         return (values.T * self.points.load).T
 
 
