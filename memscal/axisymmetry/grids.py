@@ -22,8 +22,24 @@ from memscal.model.arrays import ArrayFunction, FloatArray, array_record, value_
 _DIRECTIONS = 64
 
 
+class _Grid:
+    """What every grid does by its transforms."""
+
+    transfer: ArrayFunction
+    forward: ArrayFunction
+    _back: ArrayFunction  # undoes ``forward``
+
+    def filtered(self, field: FloatArray, factor: FloatArray) -> FloatArray:
+        """Multiply the transform of a field by a real factor."""
+        return self._back(self.forward(field) * factor)
+
+    def convolve(self, kernel: FloatArray, field: FloatArray) -> FloatArray:
+        """Convolve a kernel about the axis with a field of the grid."""
+        return self._back(self.transfer(kernel) * self.forward(field))
+
+
 @value_record
-class EvenGrid:
+class EvenGrid(_Grid):
     """A quarter plane of ``count`` by ``count`` points, ``spacing`` (m) apart, axis included.
 
     >>> EvenGrid(count=3, spacing=1e-3).axes[0]
@@ -74,6 +90,7 @@ class EvenGrid:
 
     #: Of an even field the axis already is at the origin.
     transfer = forward
+    _back = inverse
 
     def axis_transfer(self, field: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return wavenumbers along one axis and the Fourier transform about the origin there."""
@@ -84,14 +101,6 @@ class EvenGrid:
         """Return the first row of the field of a real even spectrum, (1, count)."""
         line = (2 * spectrum.sum(axis=0) - spectrum[0] - spectrum[-1]) / (2 * (self.count - 1))
         return scipy.fft.idct(line[None], type=1) / self.cell_area
-
-    def filtered(self, field: FloatArray, factor: FloatArray) -> FloatArray:
-        """Multiply the transform of a field by a real factor."""
-        return self.inverse(self.forward(field) * factor)
-
-    def convolve(self, kernel: FloatArray, field: FloatArray) -> FloatArray:
-        """Convolve two even fields."""
-        return self.inverse(self.forward(kernel) * self.forward(field))
 
     def integrate(self, field: FloatArray) -> float:
         """Integral of an even field over the whole plane that the quarter stands for."""
@@ -123,7 +132,7 @@ class EvenGrid:
 
 
 @array_record
-class Lattice:
+class Lattice(_Grid):
     """A rectangular lattice for a raster: odd numbers of even positions about the axis, in m.
 
     >>> Lattice(x=np.linspace(-2e-3, 2e-3, 5), y=np.linspace(-1e-3, 1e-3, 3)).spacing
@@ -203,14 +212,6 @@ class Lattice:
         """Return wavenumbers along x and the Fourier transform about the central point there."""
         line = scipy.fft.rfft(scipy.fft.ifftshift(field.sum(axis=0)))
         return self.wavenumber_axis, line * self.cell_area
-
-    def filtered(self, field: FloatArray, factor: FloatArray) -> FloatArray:
-        """Multiply the transform of a field by a real factor."""
-        return self._back(self.forward(field) * factor)
-
-    def convolve(self, kernel: FloatArray, field: FloatArray) -> FloatArray:
-        """Convolve a kernel centred on the central point with a field of the lattice."""
-        return self._back(self.transfer(kernel) * self.forward(field))
 
     def integrate(self, field: FloatArray) -> float:
         """Integral of a field over the lattice."""
