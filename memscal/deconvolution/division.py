@@ -217,9 +217,7 @@ class Wiener(_Own):
         blurred, spread, scale = problem.images()
         penalty = np.abs(laplacian(2, blurred.shape)[0])
         spectrum = np.abs(np.fft.rfft2(np.fft.ifftshift(spread)))
-        weakest = problem.weakest_reference / (
-            problem.grid.cell_area * problem.grid.to_image(problem.reference).sum()
-        )
+        weakest = problem.weakest_reference / problem.grid.integrate(problem.reference)
         # Along one axis: the first component weaker than the weakest relevant one, or the last.
         index = int(np.argmax(spectrum[0] < weakest)) or spectrum.shape[1] - 1
         balance = (self.amplitude * NOISE_RATIO * weakest / penalty[0, index]) ** 2

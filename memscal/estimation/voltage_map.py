@@ -101,7 +101,7 @@ class VoltageMap:
                 dense = right if isinstance(right, np.ndarray) else right.toarray()
                 columns = factor.correlate_adjoint(noise[:, None] * dense)
             parts.append((left, columns))
-        scale = noise if factor is None else np.ones_like(noise)
+        scale = noise if factor is None else None
         total: FloatArray = np.zeros((len(self), len(self)))
         for i, (left, right) in enumerate(parts):
             total += left @ _gram(right, right, scale) @ left.T

@@ -224,23 +224,19 @@ def _voltage_width(x: FloatArray, y: FloatArray, u: FloatArray) -> float:
 def _cure(lengths: Lengths) -> str:
     """Name the units to check, and the values of each input that make all lengths usual ones."""
     inputs = {
-        "positions (/entry/data/x)": ("span", "step", "width"),
-        "a film thickness (/entry/sample/film/thickness)": ("thickness",),
-        "a rod radius (/entry/indenter/radius)": ("radius",),
+        "positions (/entry/data/x) {:g} to {:g} times as large": ("span", "step", "width"),
+        "a film thickness (/entry/sample/film/thickness) of {:g} to {:g} mm": ("thickness",),
+        "a rod radius (/entry/indenter/radius) of {:g} to {:g} mm": ("radius",),
     }
     causes = []
-    for name, scaled in inputs.items():
+    for words, scaled in inputs.items():
         low, high = _usual_factors(lengths, scaled)
         if not 0 < low < high < np.inf:  # so of a rod that is none
             continue
-        value = "{:g} to {:g} times as large"
-        millimetres = 1.0
-        if len(scaled) == 1:
-            value = "of {:g} to {:g} mm"
-            millimetres = lengths[scaled[0]] * 1e3
+        millimetres = lengths[scaled[0]] * 1e3 if len(scaled) == 1 else 1.0
         # Two digits, without a power of ten.
         ends = (float(f"{factor * millimetres:.2g}") for factor in (low, high))
-        causes.append(f"{name} {value.format(*ends)}{_mistake_within(low, high)}")
+        causes.append(words.format(*ends) + _mistake_within(low, high))
     if not causes:
         return "Check the units of /entry/data/x, /entry/sample/film/thickness and /entry/indenter."
     return f"Check the units. The scan would be a usual one with {'; or with '.join(causes)}."
