@@ -197,28 +197,25 @@ class _Conditionals:
         """Derivatives of the means by the weighted data, summed by shares (h,): (p, n)."""
         sensor_shares = np.bincount(self.family, shares, len(self.sensors.q))
         some = shares > 0
-        kept = sensor_shares > 0
         components = self.by_component[some] * (shares[:, None] * self.filter)[some, None, :]
-        weighted = sensor_shares[kept, None, None] * self.sensors.q[kept]
-        by_parameters = _abreast([components, self.sensors.root[kept]])
+        weighted = sensor_shares[:, None, None] * self.sensors.q
+        by_parameters = _abreast([components, self.sensors.root])
         return by_parameters @ _abreast([self.left[some], weighted]).T
 
     def covariance_root(self, shares: FloatArray) -> FloatArray:
         """Square root (p, c) of the sum of covariances by shares (h,)."""
         sensor_shares = np.bincount(self.family, shares * self.variance, len(self.sensors.q))
-        some = shares > 0
-        kept = sensor_shares > 0
         # Posterior variances along the singular vectors; in all other directions the prior's.
         prior = self.prior[:, None]
         variance = self.variance[:, None]
         along = shares[:, None] * prior * variance / (variance + prior * self.singular**2)
         parts = [
-            self.sensors.root[kept] * (sensor_shares[kept] ** 0.5)[:, None, None],
-            self.by_component[some] * (along[some] ** 0.5)[:, None, :],
+            self.sensors.root * (sensor_shares**0.5)[:, None, None],
+            self.by_component * (along**0.5)[:, None, :],
         ]
         if self.right.shape[1] < self.right.shape[2]:
-            hidden = self.by_amplitude[some] - self.by_component[some] @ self.right[some]
-            parts.append(hidden * ((shares * self.prior)[some] ** 0.5)[:, None, None])
+            hidden = self.by_amplitude - self.by_component @ self.right
+            parts.append(hidden * ((shares * self.prior) ** 0.5)[:, None, None])
         return _abreast(parts)
 
 
