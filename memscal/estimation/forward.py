@@ -216,16 +216,21 @@ class ForwardModel:
         return self.parabola[:, None] * inside
 
     @cached_property
-    def parabola(self) -> FloatArray:
-        """Square of the distance from the middle of each scan over its half range, (n,)."""
-        column = np.zeros_like(self.points.u)
+    def _within(self) -> FloatArray:
+        """Positions along x and y from the middle of each scan over its half ranges, (2, n)."""
+        within = np.zeros_like(self.points.positions)
         for scan in range(self.points.scans):
             inside = self.points.scan == scan
-            for position in self.points.positions[:, inside]:
-                half = np.ptp(position) / 2
-                if half > 0:
-                    column[inside] += ((position - position.min() - half) / half) ** 2
-        return column
+            positions = self.points.positions[:, inside]
+            half = np.ptp(positions, axis=1, keepdims=True) / 2
+            middle = positions.min(axis=1, keepdims=True) + half
+            within[:, inside] = (positions - middle) / np.where(half > 0, half, 1.0)
+        return within
+
+    @property
+    def parabola(self) -> FloatArray:
+        """Square of the distance from the middle of each scan over its half range, (n,)."""
+        return np.asarray(np.sum(self._within**2, axis=0))
 
     @cached_property
     def straight_columns(self) -> FloatArray:
@@ -233,13 +238,7 @@ class ForwardModel:
         columns = []
         for scan, free in enumerate(self.points.free):
             inside = self.points.scan == scan
-            columns.append(inside.astype(np.float64))
-            for axis in np.flatnonzero(free):
-                position = self.points.positions[axis]
-                measured = position[inside]
-                middle = (measured.max() + measured.min()) / 2
-                drift = (position - middle) / (np.ptp(measured) / 2)
-                columns.append(np.where(inside, drift, 0.0))
+            columns += [inside, *(self._within[free] * inside)]
         return np.stack(columns, axis=1)
 
     @cached_property
