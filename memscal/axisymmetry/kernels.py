@@ -25,7 +25,7 @@ def gaussian_transfer_slope(k: FloatArray, sigma: float) -> FloatArray:
     return -sigma * k**2 * gaussian_transfer(k, sigma)
 
 
-def unit_gaussian(r: FloatArray, sigma: float) -> FloatArray:
+def unit_gaussian(r: FloatArray, sigma: FloatArray | float) -> FloatArray:
     """Gaussian of unit integral over the plane, in 1/m^2."""
     return np.exp(-0.5 * (r / sigma) ** 2) / (2 * np.pi * sigma**2)
 
@@ -113,13 +113,11 @@ class GaussianMixture:
 
     def transform(self, k: FloatArray) -> FloatArray:
         """Two-dimensional Fourier transform at ``k`` (rad/m); one at k = 0."""
-        terms = zip(self.weights, self.sigmas, strict=True)
-        return np.asarray(sum(w * gaussian_transfer(k, s) for w, s in terms))
+        return gaussian_transfer(np.expand_dims(k, -1), np.array(self.sigmas)) @ self.weights
 
     def radial(self, r: FloatArray) -> FloatArray:
         """G at radii ``r`` (m), in 1/m^2."""
-        terms = zip(self.weights, self.sigmas, strict=True)
-        return np.asarray(sum(w * unit_gaussian(r, s) for w, s in terms))
+        return unit_gaussian(np.expand_dims(r, -1), np.array(self.sigmas)) @ self.weights
 
     def describe(self) -> dict[str, float | str]:
         """Weights and widths as text; the width of a single Gaussian, in m, as a number."""
