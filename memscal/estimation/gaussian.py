@@ -133,9 +133,9 @@ def _robust_start_of_scan(model: ForwardModel, weights: FloatArray) -> ArrayTrip
     if model.reference.source:
         # A source may be far narrower than G.
         widths = np.geomspace(0.5 * points.step, 0.25 * points.span, _SOURCE_WIDTHS)
-    kernels = np.stack([gaussian_transfer(model.k, width) for width in widths])
+    kernels = gaussian_transfer(model.k[:, None], widths)
     # Profiles per newton of every width, on a table for quick trials.
-    spectra = (model.reference.values * kernels).T
+    spectra = model.reference.values[:, None] * kernels
     wavenumbers = model.reference.wavenumbers
     tables = wavenumbers.synthesise(spectra, radii, order=model.reference.order).T
     root = np.sqrt(weights)

@@ -141,8 +141,8 @@ def _widened(estimate: ProfileEstimate, factors: tuple[float, ...]) -> FloatArra
     """Profiles of Gaussians of several widths, shape (n, factors): smooth test functions."""
     model = estimate.model
     fit = estimate.gaussian
-    kernels = [gaussian_transfer(model.k, factor * fit.width) for factor in factors]
-    return model.signal(fit.geometry, np.stack(kernels, axis=1))
+    kernels = gaussian_transfer(model.k[:, None], fit.width * np.array(factors))
+    return model.signal(fit.geometry, kernels)
 
 
 def _add(estimate: ProfileEstimate, columns: FloatArray) -> ExtraColumns:

@@ -411,8 +411,9 @@ def scans_by_load(scans: Sequence[Scan]) -> tuple[list[Scan], tuple[int, ...]]:
                 u = scan.load_uncertainty and scan.load_uncertainty * load / scan.stated_load
                 part = scan.only_passes(np.sort(numbers[group]))
                 parts.append(replace(part, load=load, load_uncertainty=u))
-        split += parts or [scan]
-        owners += [i] * max(len(parts), 1)
+        parts = parts or [scan]
+        split += parts
+        owners += [i] * len(parts)
     return split, tuple(owners)
 
 

@@ -140,8 +140,9 @@ def _fitted(
     reach = (1 + 2e-9) * rounded_reach(radius.max(), points.step)
     nodes = reference.wavenumbers
     arrays = (array.tobytes() for array in (nodes.k, nodes.weights, reference.values))
-    layout = _layout(reach, points.step, reference.order, reference.source, *arrays)
-    basis, intervals, free, penalty, transform = layout
+    basis, intervals, free, penalty, transform = _layout(
+        reach, points.step, reference.order, reference.source, *arrays
+    )
     interval = np.minimum((radius / reach * intervals).astype(np.intp), intervals - 1)
     splines = basis(radius, 0)
     gain = _smoothed(splines, interval, free, penalty, y, weight)
