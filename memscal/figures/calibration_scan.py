@@ -64,19 +64,14 @@ def draw_scans(panels: Sequence[Axes], loads: Loads) -> None:
             load += f"\nand {len(loads) - MOST_PANELS} more loads"
         axes.text(0.98, 0.92, load, ha="right", va="top", color=look[0], transform=axes.transAxes)
     if len(panels) > 1:
-        _share_labels(panels)
+        # The labels of the vertical axes stand once, in the middle of the panels.
+        for i, axes in enumerate(panels):
+            for labelled in (axes, *axes.child_axes):
+                label = labelled.yaxis.label
+                label.set(visible=i == len(panels) // 2, y=0.5 if len(panels) % 2 else 1.0)
+                labelled.set_in_layout(labelled is axes)
+                labelled.yaxis.labelpad = 10  # clear of the longer numbers of other panels
     legend_above(panels[0], points=loads[0][1].reconvolution.x.size, first=drawn[0])
-
-
-def _share_labels(panels: Sequence[Axes]) -> None:
-    """Show the labels of the vertical axes once, in the middle of the panels."""
-    middle = len(panels) // 2
-    for i, axes in enumerate(panels):
-        for labelled in (axes, *axes.child_axes):
-            label = labelled.yaxis.label
-            label.set(visible=i == middle, y=0.5 if len(panels) % 2 else 1.0)
-            labelled.set_in_layout(labelled is axes)
-            labelled.yaxis.labelpad = 10  # clear of the longer numbers of other panels
 
 
 def draw_scan_log(axes: Axes, data: ApparatusData, loads: Loads) -> None:

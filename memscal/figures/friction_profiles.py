@@ -277,7 +277,22 @@ def friction_set_figure(comparison: FrictionComparison, lubrication: str) -> Fig
         panels[1, 0].set_ylabel("beyond frictionless\n(% of its maximum)")
         panels[2, 0].set_ylabel("residual / $u$")
         figure.align_ylabels(panels[:, 0])
-        _legend_of_friction(figure, comparison, loads[0])
+        first = loads[0]
+        point = Line2D([], [], ms=3, ls="none", **mark(first.lubrication, "k"))
+        point.set_label(f"measured, {lubricated_words(first.lubrication)}")
+        handles = [point]
+        for i in _shown_indices(comparison):
+            mu = comparison.friction[i]
+            line = Line2D([], [], color=friction_colour(mu), lw=1.2)
+            line.set_label(rf"$\mu$ = {friction_name(mu)}")
+            handles.append(line)
+        figure.legend(
+            handles=handles,
+            title=f"{first.loading} loading" if first.loading else "profiles as given",
+            title_fontsize=8,
+            loc="outside upper center",
+            ncols=len(handles),
+        )
     return figure
 
 
@@ -308,24 +323,3 @@ def _draw_set(
     many = stress.size > SCATTER_THRESHOLD
     draw_measured(axes, profile.r / MM, stress, errors, many=many, **look)
     axes.set_xlim(0, 1.03 * r[-1] / MM)
-
-
-def _legend_of_friction(
-    figure: Figure, comparison: FrictionComparison, at_load: LoadComparison
-) -> None:
-    point = Line2D([], [], ms=3, ls="none", **mark(at_load.lubrication, "k"))
-    point.set_label(f"measured, {lubricated_words(at_load.lubrication)}")
-    handles = [point]
-    for i in _shown_indices(comparison):
-        mu = comparison.friction[i]
-        line = Line2D([], [], color=friction_colour(mu), lw=1.2)
-        line.set_label(rf"$\mu$ = {friction_name(mu)}")
-        handles.append(line)
-    title = f"{at_load.loading} loading" if at_load.loading else "profiles as given"
-    figure.legend(
-        handles=handles,
-        title=title,
-        title_fontsize=8,
-        loc="outside upper center",
-        ncols=len(handles),
-    )
