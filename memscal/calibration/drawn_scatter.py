@@ -47,13 +47,12 @@ def drawn_scatter(solution: Solution) -> DrawnScatter | None:
     estimate = solution.estimate
     model = estimate.model
     predicted = estimate.predicted
-    noise = estimate.noise / estimate.outlier_weight**0.5
     for _ in range(count):
         # Noise of the voltages (n,), in V, with which the estimate moves to first order.
         error = rng.standard_normal(predicted.size)
         if estimate.correlation:
             error = estimate.correlation.correlate(error)
-        error = noise * error
+        error = estimate.scatter * error
         new_seed = int(rng.integers(2**32))
         change = weighed.gain @ error
         drawn_model = replace(model, points=replace(model.points, u=predicted + error))

@@ -19,7 +19,6 @@ is counted beside that, as it is for the profile (``window``).
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -29,7 +28,6 @@ from scipy.fft import fftfreq, fftshift, ifftshift, irfft2, rfft2, rfftfreq
 from memscal.calibration.fields import cosine_taper
 from memscal.calibration.stages import Deconvolution, Solution
 from memscal.calibration.uncertainty import Correlations, Effects, correlation_matrix
-from memscal.estimation.outliers import variances_nearby
 from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.voltage_map import BLOCK, square_root
 from memscal.model.arrays import (
@@ -66,14 +64,6 @@ def field_errors(
 
     fields: Any = solution.fields
     estimate = solution.estimate
-    if estimate.raster_noise:
-        # Errors of the stage make more noise where the voltage is steep; outliers count little.
-        outlier = estimate.outlier_weight
-        residual = outlier**0.5 * (estimate.points.u - estimate.predicted)
-        near = variances_nearby(estimate.points, residual)
-        near = np.where(near > 0, near, estimate.noise**2)
-        estimate = replace(estimate, weights=outlier * estimate.noise_scale**2 / near)
-        solution = replace(solution, estimate=estimate)
     g = deconvolution.g
     inputs = np.zeros((estimate.points.u.size, 0))
     if effects:
@@ -285,7 +275,7 @@ def _division_variances(
     moved, hidden, sums = _by_parameters(estimate, axes, inside, taper, division)
     count = moved.shape[1]
     gain = estimate.weighed.gain
-    noise = estimate.noise**2 / estimate.outlier_weight
+    noise = estimate.scatter**2
     # Of A G: of the readings themselves, of these with what was fitted to them, of the latter.
     own = np.zeros(shape)
     np.add.at(own, fields.index, share**2 * noise)
@@ -299,7 +289,7 @@ def _division_variances(
         for some in slices(right.shape[1], _COLUMNS):
             readings = division.divided(noise[:, None] * np.asarray(right[:, some]))
             variance += 2 * np.sum((moved @ left[:, some]) * readings, axis=1)
-    fitted = square_root(gain.covariance(np.sqrt(noise)))
+    fitted = square_root(gain.covariance(estimate.scatter))
     for some in slices(count, _COLUMNS):
         variance += np.sum((moved @ fitted[:, some]) ** 2, axis=1)
     # A is the sum of A G over the nodes.

@@ -88,14 +88,20 @@ class ProfileEstimate:
         """Correlation of the noise: as stated, or as found where none is."""
         return self.slow.covariance if self.slow else self.points.decorrelation
 
+    @cached_property
+    def scatter(self) -> FloatArray:
+        """Noise (n,) of each voltage from scan to scan, in V: as adopted, of a raster as found."""
+        noise = self.noise / self.outlier_weight**0.5
+        if not self.raster_noise:
+            return noise
+        # Errors of the stage make more noise where the voltage is steep; outliers count little.
+        residual = self.outlier_weight**0.5 * self.weighed.residual
+        near = variances_nearby(self.points, residual)
+        return np.where(near > 0, np.sqrt(near / self.outlier_weight), noise)
+
     def scattered(self, numbers: VoltageMap) -> FloatArray:
         """Columns (m, c) of a root of the covariance of numbers, by the voltages' noise."""
-        factor = self.correlation
-        noise = self.noise / self.outlier_weight**0.5
-        if noise.size > DENSE:
-            return square_root(numbers.covariance(noise, factor))
-        scaled = noise * numbers.dense()
-        return scaled if factor is None else factor.correlate_adjoint(scaled.T).T
+        return _root(numbers, self.scatter, self.correlation)
 
     @cached_property
     def fixed_root(self) -> FloatArray:
@@ -117,7 +123,8 @@ class ProfileEstimate:
     @cached_property
     def hidden_root(self) -> FloatArray:
         """Square root of what of the covariance neither noise nor a curved baseline makes."""
-        white = replace(self, slow=None).scattered(self.weighed.gain)
+        noise = self.noise / self.outlier_weight**0.5
+        white = _root(self.weighed.gain, noise, self.points.decorrelation)
         known = np.hstack([white, self.curving])
         covariance = self.weighed.covariance
         return square_root(covariance - known @ known.T, np.diag(covariance))
@@ -247,6 +254,14 @@ class ProfileEstimate:
     def largest_signal(self) -> float:
         """Largest voltage above the background, in V."""
         return float(np.abs(self.signal).max())
+
+
+def _root(numbers: VoltageMap, noise: FloatArray, factor: Decorrelation | None) -> FloatArray:
+    """Columns (m, c) of a root of the covariance of numbers, by a noise and its correlation."""
+    if noise.size > DENSE:
+        return square_root(numbers.covariance(noise, factor))
+    scaled = noise * numbers.dense()
+    return scaled if factor is None else factor.correlate_adjoint(scaled.T).T
 
 
 def estimate_profile(
