@@ -118,3 +118,9 @@ def test_a_wrong_disc_stops_the_division_where_its_misfit_is(monkeypatch):
     assert wrong.solution.band.relevant < 0.8 * right.solution.band.relevant
     g = wrong.apparatus.field.g
     assert g.min() > -0.08 * g.max()
+
+
+@pytest.mark.parametrize(("stage", "free"), [(0.0, True), (50e-6, False)])
+def test_a_free_g_is_taken_of_even_noise_alone(monkeypatch, stage, free):
+    monkeypatch.setitem(KINDS, f"{stage}", (KINDS["stage"][0], 28, stage, 1.0))
+    assert calibrated(f"{stage}", 1)[0].solution.estimate.free is free
