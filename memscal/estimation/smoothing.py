@@ -272,9 +272,8 @@ def _even_splines(knots: FloatArray) -> Splines:
     from scipy.interpolate import BSpline
     from scipy.sparse import csr_array, eye_array, vstack
 
-    both = np.concatenate([-knots[:0:-1], knots])
-    outside = (knots[1] - knots[0]) * np.arange(_DEGREE, 0, -1)
-    extended = np.concatenate([both[0] - outside, both, both[-1] + outside[::-1]])
+    right = np.append(knots, knots[-1] + knots[1] * np.arange(1, _DEGREE + 1))
+    extended = np.append(-right[:0:-1], right)
     count = extended.size - _DEGREE - 1
     spline = BSpline(extended, np.eye(count), _DEGREE)
     middle = count // 2
