@@ -139,7 +139,20 @@ def _table_spectrum(reference: StressProfile, k: FloatArray, span: float, order:
             cure="Give a reference with sigma_rz (memscal import --format reference --shear "
             "COLUMN), or leave it out to have the rod solved.",
         )
-    _require_coverage(reference, stress, span)
+    needed = span / 2
+    tail = abs(stress[-1]) / np.abs(stress).max()
+    if reference.r[-1] < needed and tail > _DECAYED:
+        raise InputError(
+            f"The reference ends at r = {reference.r[-1] * 1e3:.4g} mm with {tail:.1%} of its "
+            f"maximum left, but the scan reaches {needed * 1e3:.4g} mm from its middle.",
+            why="The stress beyond the table would be missing from every distant point.",
+            cure="Extend the reference to where it has decayed, or leave it out to compute it.",
+        )
+    if reference.r[0] > 0.1 * needed:
+        why = "The stress on the axis, its largest, is missing."
+        cure = "Give the reference from r = 0 outward."
+        problem = f"The reference begins at r = {reference.r[0] * 1e3:.4g} mm."
+        raise InputError(problem, why=why, cure=cure)
     values = hankel_transform(reference.r, stress, k, order=order) / reference.load
     # Most of a shear, whatever the film, holds the film back.
     if order and values[np.argmax(np.abs(values))] > 0:
@@ -172,23 +185,6 @@ def carried_force(stress: BaseStress, reference: RadialSpectrum) -> float:
     if reference.order == 0:
         return reference.integral
     return 1.0 if isinstance(stress, Contact) else stress.force / stress.load
-
-
-def _require_coverage(profile: StressProfile, stress: FloatArray, span: float) -> None:
-    needed = span / 2
-    tail = abs(stress[-1]) / np.abs(stress).max()
-    if profile.r[-1] < needed and tail > _DECAYED:
-        raise InputError(
-            f"The reference ends at r = {profile.r[-1] * 1e3:.4g} mm with {tail:.1%} of its "
-            f"maximum left, but the scan reaches {needed * 1e3:.4g} mm from its middle.",
-            why="The stress beyond the table would be missing from every distant point.",
-            cure="Extend the reference to where it has decayed, or leave it out to compute it.",
-        )
-    if profile.r[0] > 0.1 * needed:
-        why = "The stress on the axis, its largest, is missing."
-        cure = "Give the reference from r = 0 outward."
-        problem = f"The reference begins at r = {profile.r[0] * 1e3:.4g} mm."
-        raise InputError(problem, why=why, cure=cure)
 
 
 def reference_sensitivities(
