@@ -219,8 +219,7 @@ class ForwardModel:
     def _within(self) -> FloatArray:
         """Positions along x and y from the middle of each scan over its half ranges, (2, n)."""
         within = np.zeros_like(self.points.positions)
-        for scan in range(self.points.scans):
-            inside = self.points.scan == scan
+        for inside in self.points.inside:
             positions = self.points.positions[:, inside]
             half = np.ptp(positions, axis=1, keepdims=True) / 2
             middle = positions.min(axis=1, keepdims=True) + half
@@ -236,8 +235,7 @@ class ForwardModel:
     def straight_columns(self) -> FloatArray:
         """Baseline and drift (from -1 to 1) along each scan, shape (n, 2 or 3 a scan)."""
         columns = []
-        for scan, free in enumerate(self.points.free):
-            inside = self.points.scan == scan
+        for inside, free in zip(self.points.inside, self.points.free, strict=True):
             columns += [inside, *(self._within[free] * inside)]
         return np.stack(columns, axis=1)
 

@@ -187,8 +187,7 @@ _ENOUGH = 10_000
 def clipped_points(estimate: ProfileEstimate) -> BoolArray:
     """Say which points were held at a ceiling, shape (n,), of a channel that is no shear."""
     clipped = np.zeros(estimate.points.u.size, dtype=np.bool_)
-    for scan in range(estimate.points.scans):
-        inside = estimate.points.scan == scan
+    for inside in estimate.points.inside:
         agreeing, top = _agreeing(estimate, inside)
         for flat in (agreeing, _plateau(estimate, inside)):
             if not top.any() and _risen_above(estimate, flat):

@@ -110,8 +110,8 @@ def isolated(points: ScanPoints, residual: FloatArray) -> FloatArray:
     from scipy.spatial import KDTree
 
     alone = np.zeros_like(residual)
-    for scan in range(points.scans):
-        rows = np.flatnonzero(points.scan == scan)
+    for inside in points.inside:
+        rows = np.flatnonzero(inside)
         places = points.positions[:, rows].T
         count = min(_NEIGHBOURS + 1, rows.size)
         nearest = np.asarray(KDTree(places).query(places, k=count)[1])[:, 1:]

@@ -183,10 +183,14 @@ class ScanPoints:
         return rows
 
     @cached_property
+    def inside(self) -> list[BoolArray]:
+        """Which points are each scan's, (n,) each."""
+        return [self.scan == scan for scan in range(self.scans)]
+
+    @cached_property
     def places(self) -> tuple[Places, ...]:
         """The places of each scan's points."""
-        inside = [self.scan == scan for scan in range(self.scans)]
-        return tuple(places_of(self.x[i], self.y[i], self.repeat[i]) for i in inside)
+        return tuple(places_of(self.x[i], self.y[i], self.repeat[i]) for i in self.inside)
 
     def place_numbers(self, name: str) -> IndexArray:
         """Return ``index``, ``row`` or ``readings`` of the places for all points, shape (n,)."""
@@ -493,8 +497,8 @@ def ordinary_readings(points: ScanPoints) -> BoolArray:
     # A converter's sentinel would draw amplitude and baseline to itself, above all at an end.
     ordinary = np.ones(points.u.size, dtype=np.bool_)
     share = _FEW_OF_RASTER if points.planar else _FEW_OF_LINE
-    for scan in range(points.scans):
-        rows = np.flatnonzero(points.scan == scan)
+    for inside in points.inside:
+        rows = np.flatnonzero(inside)
         distance = np.abs(points.u[rows] - np.median(points.u[rows]))
         order = np.argsort(distance)
         few = max(int(share * rows.size), 1)
