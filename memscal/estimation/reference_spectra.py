@@ -1,7 +1,7 @@
 """Spectra of reference stresses, and their change with the film's thickness and other inputs."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import lru_cache
@@ -192,7 +192,7 @@ def reference_sensitivities(
 ) -> dict[str, list[FloatArray]]:
     """Change of each scan's transform by one standard uncertainty of each input, by its name."""
     changes: dict[str, list[FloatArray]] = {}
-    todo = list(product(_SENSITIVITIES, range(len(scans))))
+    todo = list(product((*_STATED, "law"), range(len(scans))))
     for owner, i in Task("uncertain inputs", len(todo)).counted(todo):
         if scans[i].film is None:
             continue
@@ -200,38 +200,39 @@ def reference_sensitivities(
         owners = [getattr(scan, owner, None) for scan in scans]
         number = list(dict.fromkeys(owners)).index(owners[i])
         suffix = f"_{number + 1}" if number else ""
-        for source, change in _SENSITIVITIES[owner](scans[i].set_up, references[i]).items():
+        if owner == "law":
+            found = law_sensitivities(scans[i].set_up, references[i])
+        else:
+            found = stated_sensitivities(scans[i].set_up, references[i], owner)
+        for source, change in found.items():
             blank = [np.zeros_like(change) for _ in scans]
             changes.setdefault(source + suffix, blank)[i] = change
     return changes
 
 
-def film_sensitivities(set_up: SetUp, reference: RadialSpectrum) -> Mapping[str, FloatArray]:
-    """Change of the reference's transform by one standard uncertainty of each film property."""
-    # Centred differences of the rod's solution, or its relative change for a reference from
-    # elsewhere.
-    changes: dict[str, FloatArray] = {}
-    # At a given load the modulus does not change the stress in a linear film.
-    for name in ("young_modulus", "thickness", "poisson_ratio"):
-        changes |= _sensitivity(set_up.expected, reference, "film", name, name)
-    return changes
+#: Uncertain quantities of film and indenter, and the names of what they change.
+_STATED = {
+    "film": {name: name for name in ("young_modulus", "thickness", "poisson_ratio")},
+    "indenter": {"radius": "rod_radius"},
+}
 
 
-def rod_sensitivities(set_up: SetUp, reference: RadialSpectrum) -> Mapping[str, FloatArray]:
-    """Change of the reference's transform by one standard uncertainty of the rod's radius."""
-    return _sensitivity(set_up, reference, "indenter", "radius", "rod_radius")
-
-
-def _sensitivity(
-    set_up: SetUp, reference: RadialSpectrum, owner: str, name: str, source: str
+def stated_sensitivities(
+    set_up: SetUp, reference: RadialSpectrum, owner: str
 ) -> dict[str, FloatArray]:
-    """Change by one standard uncertainty of a quantity of film or indenter, where one is stated."""
-    ends = more_and_less(getattr(set_up, owner), name)
-    if not ends:
-        return {}
-    more, less, share = ends
-    varied = (set_up._replace(**{owner: more}), set_up._replace(**{owner: less}))
-    return {source: share * difference(set_up, reference, *varied)}
+    """Change of the reference's transform by each uncertainty stated of a film or an indenter."""
+    # Centred differences of the rod's solution, or its relative change for a reference from
+    # elsewhere.  At a given load the modulus does not change the stress in a linear film.
+    changes: dict[str, FloatArray] = {}
+    if owner == "film":
+        set_up = set_up.expected
+    for name, source in _STATED[owner].items():
+        ends = more_and_less(getattr(set_up, owner), name)
+        if ends:
+            more, less, share = ends
+            varied = (set_up._replace(**{owner: more}), set_up._replace(**{owner: less}))
+            changes[source] = share * difference(set_up, reference, *varied)
+    return changes
 
 
 def load_sensitivities(
@@ -249,7 +250,7 @@ def load_sensitivities(
     return changes
 
 
-def law_sensitivities(set_up: SetUp, reference: RadialSpectrum) -> Mapping[str, FloatArray]:
+def law_sensitivities(set_up: SetUp, reference: RadialSpectrum) -> dict[str, FloatArray]:
     """Change of the reference's transform by what is not known of the film's law."""
     # Rectangles: half as wide as the difference of a linear film is large where no law is stated
     # (``model_form``), and as half that of sticking and sliding where the friction of a rod on a
@@ -279,14 +280,6 @@ def spectrum_difference(reference: RadialSpectrum, first: Contact, second: Conta
     k = reference.wavenumbers.k.tobytes()
     upper, lower = (_base_spectrum(c, k, reference.order) / c.load for c in (first, second))
     return upper - lower
-
-
-#: Whose error each is: scans of one film share that of the film.
-_SENSITIVITIES = {
-    "film": film_sensitivities,
-    "indenter": rod_sensitivities,
-    "law": law_sensitivities,
-}
 
 
 def difference(set_up: SetUp, reference: RadialSpectrum, more: SetUp, less: SetUp) -> FloatArray:

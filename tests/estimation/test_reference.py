@@ -11,7 +11,7 @@ import memscal
 from memscal.axisymmetry.kernels import blurred_disc
 from memscal.errors import InputError
 from memscal.estimation.points import measured_points
-from memscal.estimation.reference_spectra import film_sensitivities, rod_sensitivities
+from memscal.estimation.reference_spectra import stated_sensitivities
 from memscal.estimation.set_up import reference_profile, require_same_set_up
 from memscal.extensions.simulation.rod_scan import PAPER_ROD
 from memscal.mechanics.contact import Contact
@@ -123,7 +123,9 @@ def test_a_reference_that_travels_in_the_scan_takes_its_film_and_agrees(tmp_path
 
 def test_sensitivities_are_the_change_of_the_solution_by_one_standard_uncertainty():
     spectrum = reference_spectrum(CONTACT, POINTS)
-    changes = film_sensitivities(SCAN.set_up, spectrum) | rod_sensitivities(SCAN.set_up, spectrum)
+    owners = ("film", "indenter")
+    film, rod = (stated_sensitivities(SCAN.set_up, spectrum, owner) for owner in owners)
+    changes = film | rod
     assert set(changes) == {"young_modulus", "thickness", "poisson_ratio", "rod_radius"}
     # At a given load the base stress of a linear film does not know its modulus...
     assert not np.any(changes["young_modulus"])
