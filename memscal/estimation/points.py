@@ -452,27 +452,23 @@ def joined_points(scans: Sequence[ScanPoints], owners: Sequence[int] | None = No
     names = ("x", "y", "u", "load", "x_errors", "branch", "anew", "free", "curvature", "repeat")
     columns = {name: np.concatenate([getattr(each, name) for each in scans]) for name in names}
     columns["repeat"] += before[number]
-    return ScanPoints(
-        **columns,
-        u_errors=np.concatenate(stated) if stated else None,
-        owner=number if owners is None else np.array(owners)[number],
-        scan=number,
-        missing=sum(points.missing for points in scans),
-        decorrelation=_joined_decorrelation(scans),
-        channel=scans[0].channel,
-        reading=scans[0].reading,
-        unit=scans[0].unit,
-    )
-
-
-def _joined_decorrelation(scans: Sequence[ScanPoints]) -> Decorrelation | None:
     blocks = []
     first = 0
     for points in scans:
         if points.decorrelation:
             blocks += [(rows + first, root) for rows, root in points.decorrelation.blocks]
         first += points.u.size
-    return Decorrelation(tuple(blocks)) if blocks else None
+    return ScanPoints(
+        **columns,
+        u_errors=np.concatenate(stated) if stated else None,
+        owner=number if owners is None else np.array(owners)[number],
+        scan=number,
+        missing=sum(points.missing for points in scans),
+        decorrelation=Decorrelation(tuple(blocks)) if blocks else None,
+        channel=scans[0].channel,
+        reading=scans[0].reading,
+        unit=scans[0].unit,
+    )
 
 
 def _decorrelation(correlation: FloatArray, keep: BoolArray) -> Decorrelation:
