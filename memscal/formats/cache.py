@@ -47,8 +47,8 @@ def table_key(content: Mapping[str, Any]) -> str:
     return hashlib.sha256(text.encode("utf-8")).hexdigest()
 
 
-def keep_contact_table(folder: FilePath, key: str, arrays: Arrays) -> bool:
-    """Write arrays under their key, remove the oldest; return whether the disk took them."""
+def keep_contact_table(folder: FilePath, key: str, arrays: Arrays) -> None:
+    """Write arrays under their key, remove the oldest; where the disk takes none, keep none."""
     # value (M,), load (L,), k (K,), transforms (M, L, K) in N, all others (M, L).
     children: Nodes = {
         name: Number(array, *_OTHERS.get(name, _TRANSFORM)) for name, array in arrays.items()
@@ -57,13 +57,10 @@ def keep_contact_table(folder: FilePath, key: str, arrays: Arrays) -> bool:
     stored: Nodes = {"contacts": contacts, "key": key, "arrays": " ".join(arrays)}
     entry = Group("NXentry", stored, {"default": "contacts"})
     data = tree_to_bytes(file_tree(CONTACT_TABLE_SCHEMA, entry))
-    try:
+    with suppress(OSError, OutputError):
         os.makedirs(folder, exist_ok=True)
         atomic_write_bytes(_path(folder, key), data, overwrite=True)
-    except (OSError, OutputError):
-        return False
-    _prune(folder)
-    return True
+        _prune(folder)
 
 
 def find_contact_table(folder: FilePath, key: str) -> Arrays | None:

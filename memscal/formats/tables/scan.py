@@ -549,7 +549,7 @@ def _placed(columns: Columns, notes: list[str], name_rows: Callable[[Any], str])
 
 def _counted(columns: Columns, others: str) -> list[str]:
     x = columns["x"]
-    y = columns.get("y", np.zeros(columns["x"].size))
+    y = columns.get("y", np.zeros(x.size))
     repeat = columns.get("repeat", np.zeros(x.size, dtype=np.intp))
     places = places_of(x, y, repeat)
     number = repeat.max() + 1
