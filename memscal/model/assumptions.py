@@ -57,6 +57,7 @@ _KNOWN = {
     "thickness": ("The film is as thick as stated.", "error of the thickness"),
     "load_scale": ("The load is as stated.", "relative error of the load"),
 }
+_NOT_KNOWN = ("", "")
 #: Those whose size is a length.
 LENGTHS = ("line_offset", "shear_sensitivity", "thickness")
 NAMES = tuple(_KNOWN)
@@ -94,7 +95,7 @@ class Assumption:
     @property
     def sentence(self) -> str:
         """What is taken for granted, in words."""
-        return self._known[0]
+        return _KNOWN.get(self.name, _NOT_KNOWN)[0]
 
     @property
     def words(self) -> str:
@@ -106,16 +107,12 @@ class Assumption:
     @property
     def measure(self) -> str:
         """What the size is of, in words."""
-        return self._known[1]
+        return _KNOWN.get(self.name, _NOT_KNOWN)[1]
 
     @property
     def is_length(self) -> bool:
         """Whether the size is a length."""
         return self.name in LENGTHS
-
-    @property
-    def _known(self) -> tuple[str, str]:
-        return _KNOWN.get(self.name, ("", ""))
 
     @property
     def unit(self) -> str:
