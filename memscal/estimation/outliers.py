@@ -20,11 +20,13 @@ _FEWEST_DIFFERENCES = 30
 #: Points of which a third difference is taken are at most so unevenly spaced.
 _UNEVEN = 4.0
 _NEIGHBOURS = 8
+#: Standard deviation of a normal distribution over its median absolute value.
+_NORMAL = 1.4826
 
 
 def robust_scale(values: FloatArray, least: float) -> float:
     """Standard deviation of a normal distribution by the median absolute value, no less."""
-    return max(1.4826 * float(np.median(np.abs(values))), least)
+    return max(_NORMAL * float(np.median(np.abs(values))), least)
 
 
 def point_weights(
@@ -35,11 +37,14 @@ def point_weights(
     # in robust standard deviations of their own, of ``least`` or more.
     root = np.sqrt(stated)
     least = _MODEL * float(np.abs(points.u).max() * np.sqrt(np.median(stated)))
-    if points.planar:
-        least = robust_scale(residual * root, least)
-        residual = isolated(points, residual)
     standardised = residual * root
-    z = np.abs(standardised) / robust_scale(standardised, least)
+    scale: FloatArray | float = robust_scale(standardised, least)
+    if points.planar:
+        standardised = isolated(points, residual) * root
+        # Errors of the stage make more noise where the voltage is steep.
+        nearby = _NORMAL * median_nearby(points, np.abs(standardised))
+        scale = np.maximum(scale, nearby)
+    z = np.abs(standardised) / scale
     return np.minimum(1.0, (threshold / np.maximum(z, threshold)) ** 4)
 
 
@@ -107,16 +112,20 @@ def _third_differences(points: ScanPoints, chosen: IndexArray) -> Any:
 def isolated(points: ScanPoints, residual: FloatArray) -> FloatArray:
     """What of each residual (n,) its neighbours in the plane do not share, (n,)."""
     # An outlier stands alone; where a model misses a sensor's shape, neighbours depart together.
+    left = residual - median_nearby(points, residual)
+    least = np.sign(left) * np.minimum(abs(left), abs(residual))
+    return np.where(left * residual > 0, least, 0.0)
+
+
+def median_nearby(points: ScanPoints, values: FloatArray) -> FloatArray:
+    """Median (n,) of the values of each point's neighbours in the plane."""
     from scipy.spatial import KDTree
 
-    alone = np.zeros_like(residual)
+    medians = np.zeros_like(values)
     for inside in points.inside:
         rows = np.flatnonzero(inside)
         places = points.positions[:, rows].T
         count = min(_NEIGHBOURS + 1, rows.size)
         nearest = np.asarray(KDTree(places).query(places, k=count)[1])[:, 1:]
-        whole = residual[rows]
-        left = whole - np.median(whole[nearest], axis=1)
-        least = np.sign(left) * np.minimum(abs(left), abs(whole))
-        alone[rows] = np.where(left * whole > 0, least, 0.0)
-    return alone
+        medians[rows] = np.median(values[rows][nearest], axis=1)
+    return medians
