@@ -98,8 +98,9 @@ def beyond_zeros(
     width = wavenumber[0, 1]
     ring = np.rint(wavenumber / width).astype(np.intp).ravel()
     power = np.bincount(ring, np.abs(voltage.ravel()) ** 2) / np.bincount(ring)
-    rings = width * np.arange(power.size)
-    relevant = min(_falls_below(rings, np.sqrt(power) / noise, _SEEN), np.pi / points.step)
+    # Rings beyond, in the corners, have few components, any of which may be large by chance.
+    rings = np.arange(0.0, np.pi / points.step, width)
+    relevant = _falls_below(rings, np.sqrt(power[: rings.size]) / noise, _SEEN)
     weakest = noise / estimate.conversion_constant
     share = min(_SEEN * weakest / float(np.interp(relevant, k, largest)), 1.0)
     blur = float(np.sqrt(-2 * np.log(share))) / relevant
