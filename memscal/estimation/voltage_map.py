@@ -24,7 +24,7 @@ DENSE = 400
 #: Points from which on columns of derivatives, which only uncertainties need, have seven digits.
 SINGLE = 250_000
 #: Rows of the blocks in which tall matrices are worked on.
-BLOCK = 32_768
+BLOCK = 8_192
 #: Columns are dependent where their singular value is below this share of the largest.
 _DEPENDENT = 1e-12
 
