@@ -43,8 +43,8 @@ _MOST_WAVES = 1000
 #: In place of the order of a Bessel function: J_1(x)/x.
 TURN = -1
 #: Phase (rad) of the last wavenumber from one radius of a table to the next, and its splines: right
-#: to 5e-9.
-_TABLE_PHASE = 0.5
+#: to 4e-10.
+_TABLE_PHASE = 0.4
 _DEGREE = 7
 #: Few points read a table where its last phase (rad) is less.
 _LONGEST_PHASE = 500.0
