@@ -34,7 +34,8 @@ def point_weights(
 ) -> FloatArray:
     """Weights of the points by their residuals; over the plane by what neighbours do not share."""
     # One, and beyond the threshold such that the influence w z falls as 1/z^3.  The residuals count
-    # in robust standard deviations of their own, of ``least`` or more.
+    # in robust standard deviations of their own, of ``least`` or more; on a raster in those of
+    # their neighbours where these are larger.
     root = np.sqrt(stated)
     least = _MODEL * float(np.abs(points.u).max() * np.sqrt(np.median(stated)))
     standardised = residual * root
