@@ -198,7 +198,7 @@ def cluster(address: str) -> Iterator[tuple[Executor, Callable[[], int]]]:
     except ModuleNotFoundError as error:
         raise MemscalError(
             "Dask (distributed) is not installed.",
-            cure='Install it with the extra "fleet": pip install "memscal[fleet]".',
+            cure='Install it with the extra "fleet": pip install ".[fleet]".',
         ) from error
     except (OSError, ValueError) as error:
         raise InputError(

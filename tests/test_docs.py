@@ -8,6 +8,7 @@ import re
 import runpy
 import shlex
 import shutil
+import tomllib
 from functools import lru_cache
 from pathlib import Path
 from types import UnionType
@@ -141,6 +142,21 @@ def test_every_message_of_the_troubleshooting_page_is_one_that_memscal_gives():
     joined = re.sub(r'"\s+f?"', "", sources)  # a text over several lines
     filled = re.sub("…+", "…", re.sub(r"\{[^{}]*\}", "…", joined))
     assert [message for message in quoted if message not in filled] == []
+
+
+def test_an_extra_is_installed_from_the_folder_never_from_an_index():
+    extras = tomllib.loads(text_of(DOCS.with_name("pyproject.toml")))["project"][
+        "optional-dependencies"
+    ]
+    [every] = extras["all"]
+    assert set(every.removeprefix("memscal[")[:-1].split(",")) == set(extras) - {"all", "peers"}
+    sources = (Path(memscal.__file__).parent.rglob("*.py"), DOCS.rglob("*.md"))
+    pages = [*map(DOCS.with_name, FRONT), *NOTEBOOKS.glob("*.py")]
+    asked = []
+    for path in pages + [path for paths in sources for path in paths]:
+        asked += re.findall(r'pip install [\\"\']*([\w.-]*\[[^\]]*\]|memscal)', text_of(path))
+    named = {name.removeprefix(".[").removesuffix("]") for name in asked}
+    assert {"tables", "all"} < named <= {*extras, "{extra}"}
 
 
 def test_every_option_in_the_documentation_exists():

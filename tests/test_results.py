@@ -8,6 +8,7 @@ from helpers.records import assert_same
 from helpers.scans import contact_scan, simulate
 
 import memscal
+from memscal.extensions import VIEWS, module
 
 
 @pytest.fixture(scope="module")
@@ -121,15 +122,40 @@ def test_draws_and_scans_are_rows_of_data_frames(drawn, scan):
         fleet[1].ufloats()
 
 
-def test_draws_have_no_figure_and_no_arrays(drawn):
-    with pytest.raises(memscal.MemscalError, match="no figure of a MonteCarlo"):
-        drawn.plot()
-    with pytest.raises(memscal.MemscalError, match="no arrays"):
-        drawn.to_xarray()
+def test_parameters_are_rows_of_a_data_frame(calibration, loaded):
+    pytest.importorskip("pandas")
+    for result, apparatus in ((calibration, calibration.apparatus), (loaded, loaded)):
+        rows = result.to_dataframe()
+        parameters = apparatus.parameters
+        assert (rows.index.name, tuple(rows.index)) == ("name", parameters.names)
+        a = rows.loc["conversion_constant"]
+        expected = [apparatus.conversion_constant, parameters.uncertainty("conversion_constant")]
+        assert list(a[["value", "standard_uncertainty"]]) == pytest.approx(expected, rel=1e-12)
+        assert list(rows["unit"][:4]) == ["V/Pa", "m", "m", "m"]
+
+
+FORMS = {"plot": None, "to_dataframe": "frame", "to_xarray": "dataset", "ufloats": "correlated"}
+
+
+@pytest.mark.parametrize("name", VIEWS)
+def test_a_result_has_the_methods_that_its_module_answers(name):
+    summary, figure = VIEWS[name]
+    places = [*memscal.PUBLIC, "extensions.fleet.results", "model.holds"]
+    [kind] = {vars(module(place))[name] for place in places if name in vars(module(place))}
+    for method, function in FORMS.items():
+        answered = bool(summary) and hasattr(module(summary), function or "")
+        assert hasattr(kind, method) is (bool(figure) if function is None else answered)
+
+
+def test_a_report_is_written_where_a_path_is_given(calibration, tmp_path):
+    page = calibration.report(tmp_path / "page.html")
+    assert (tmp_path / "page.html").read_text(encoding="utf-8") == page == calibration.report()
+    with pytest.raises(memscal.MemscalError, match="folder"):
+        calibration.report(tmp_path / "none" / "page.html")
 
 
 def test_a_missing_library_is_named_with_the_extra_that_brings_it(calibration, monkeypatch):
     monkeypatch.setitem(sys.modules, "xarray", None)
-    said = r"(?s)xarray is not installed.*memscal\[interop\]"
+    said = r"(?s)xarray is not installed.*\.\[interop\]"
     with pytest.raises(memscal.MemscalError, match=said):
         calibration.to_xarray()

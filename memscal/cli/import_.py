@@ -81,8 +81,8 @@ Examples:
 Columns are given by their names in the header, or by their numbers counted from 1 where no name
 is a number. Units stand in the header (x [mm], x/mm) or in a row below it. Missing values are
 empty cells and the words nan, na, n/a, #n/a, nat, null, none and -. Workbooks and Parquet need the
-extra tables: pip install "memscal[tables]"; TDMS needs the extra recorded.
-Meshes (.vtu, .vtk, .xdmf) need the extra fem-io: pip install "memscal[fem-io]".
+extra tables: pip install ".[tables]"; TDMS needs the extra recorded.
+Meshes (.vtu, .vtk, .xdmf) need the extra fem-io: pip install ".[fem-io]".
 """
 
 _CELL_NAMES = {"name": "load_cell", "serial_number": "load_cell_serial"}

@@ -23,7 +23,7 @@ from memscal.summaries.table import WIDTH, Table, as_it_is, folded, readable, te
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from memscal.model.result import Result
+    from memscal.model.result import Shown, Told
 
 
 def emit(text: str) -> None:
@@ -183,12 +183,12 @@ def emit_tables(*tables: Table, answer: str = "") -> None:
 
 
 def emit_result(
-    result: Result,
+    result: Told,
     head: Mapping[str, Any],
     *,
     as_json: bool,
     brief: bool = False,
-    further: Mapping[str, Result] | None = None,
+    further: Mapping[str, Told] | None = None,
 ) -> None:
     """Print the answer of a result, and unless that is enough its tables and those of others.
 
@@ -269,13 +269,13 @@ def rendered(draw: Callable[[], Figure], paths: Sequence[Path]) -> dict[Path, by
     return {path: render_figure(figure, figure_format(path.suffix)) for path in paths}
 
 
-def reported(result: Result, path: Path | None) -> dict[Path, bytes]:
+def reported(result: Told, path: Path | None) -> dict[Path, bytes]:
     """Return a result's page as the bytes of its file, if one is asked for."""
     return {} if path is None else {path: result.report().encode("utf-8")}
 
 
 def drawn(
-    result: Result, figures: Sequence[Path] = (), report: Path | None = None
+    result: Shown, figures: Sequence[Path] = (), report: Path | None = None
 ) -> dict[Path, bytes]:
     """Return figure and page of a result as the bytes of their files."""
     with working("Drawing"):

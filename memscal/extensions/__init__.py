@@ -66,7 +66,9 @@ VIEWS = {
 """Class of a result: the module with its tables, and the function that draws it."""
 
 HOOKS = {
+    "html_image": "figures.report",
     "html_report": "figures.report",
+    "atomic_write_bytes": "formats.files",
     "text_of": "summaries.table",
     "scan_of_arrays": "formats.tables.scan",
     "write_artifact": "formats.artifact",

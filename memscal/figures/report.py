@@ -27,7 +27,7 @@ from memscal.model.measured_stress import MeasuredScan, MeasuredStress
 from memscal.model.notation import format_measured
 from memscal.model.provenance import Process, SourceFile
 from memscal.model.quantities import KPA, PER_MM, Quantity, Record, by_name, estimated_quantity
-from memscal.model.result import Result
+from memscal.model.result import Drawn, Told
 from memscal.model.scan import Scan
 from memscal.model.stress import StressProfile
 from memscal.summaries import comparison as comparisons
@@ -76,7 +76,7 @@ class Report:
     process: Process | None = None
 
 
-def html_report(result: Result) -> str:
+def html_report(result: Told) -> str:
     """Return a result as a self-contained HTML page; what came from files is escaped."""
     report = report_of(result)
     tables = [table for table in result.tables() if table.title != CHECKS]
@@ -124,10 +124,10 @@ def _html(tables: Sequence[Table]) -> str:
 def html_figures(pictures: Sequence[Picture]) -> str:
     """Return figures with their captions, as images that the page holds."""
     figures = [picture.draw() for picture in pictures]
-    images = [_image(figure, "svg", 72.0) for figure in figures]
+    images = [html_image(figure, "svg", 72.0) for figure in figures]
     for i in sorted(range(len(images)), key=lambda i: -len(images[i])):
         if sum(map(len, images)) > _MOST_IMAGE_BYTES:
-            images[i] = _image(figures[i], "png", _COARSE)
+            images[i] = html_image(figures[i], "png", _COARSE)
     return "\n".join(
         f'<figure>\n<img alt="{escape(picture.alt)}" src="{image}">\n'
         f"<figcaption>{escape(picture.caption)}</figcaption>\n</figure>"
@@ -135,14 +135,14 @@ def html_figures(pictures: Sequence[Picture]) -> str:
     )
 
 
-def _image(figure: Figure, form: str, dpi: float) -> str:
+def html_image(figure: Figure, form: str, dpi: float) -> str:
     """Return a figure as the address of an image, which holds it."""
     content = base64.b64encode(render_figure(figure, form, dpi=dpi)).decode("ascii")
     return f"data:image/{'svg+xml' if form == 'svg' else form};base64,{content}"
 
 
 @singledispatch
-def report_of(result: Result) -> Report:
+def report_of(result: Told) -> Report:
     """Return what the page of a result says beside its tables; its figure's module may state it."""
     drawn_in = VIEWS[type(result).__name__][1].rpartition(".")[0]
     if drawn_in.startswith("extensions.") and hasattr(module(drawn_in), "report"):
@@ -152,7 +152,7 @@ def report_of(result: Result) -> Report:
     title = tables[0].title if tables else type(result).__name__
     return Report(
         title=title,
-        pictures=[Picture(result.plot, title, title)] if drawn_in else [],
+        pictures=[Picture(result.plot, title, title)] if isinstance(result, Drawn) else [],
         checks=getattr(result, "checks", ()),
         messages=getattr(result, "messages", ()),
     )

@@ -14,7 +14,7 @@ from memscal.model.arrays import FloatArray, array_record, value_record
 from memscal.model.checks import Checked, Message, QualityCheck, state_of_checks
 from memscal.model.measured_stress import MeasuredProfile, MeasuredStress
 from memscal.model.notation import format_bound
-from memscal.model.result import Result
+from memscal.model.result import Correlated, Shown, Tabulated
 
 if TYPE_CHECKING:
     from memscal import InterfaceComparison
@@ -262,7 +262,7 @@ def joint_text(joint: Joint) -> str:
 
 
 @array_record
-class FrictionComparison(Result, Checked):
+class FrictionComparison(Shown, Tabulated, Correlated, Checked):
     """Measured stress against calculated contacts, with the friction that explains it.
 
     ``joint``, of all loads together, is by normal stress and shear together where ``shear``, the

@@ -8,11 +8,11 @@ from numpy.typing import NDArray
 
 from memscal.model.arrays import Arrays, FloatArray, IndexArray, array_record
 from memscal.model.notation import Reading
-from memscal.model.result import Result
+from memscal.model.result import Drawn
 
 
 @array_record
-class Holds(Result):
+class Holds(Drawn):
     """Holds that were found in a log of n rows, m of them, in SI units."""
 
     log: Arrays  # (n,) each: x, u_zz, and y and normal_load where they are logged

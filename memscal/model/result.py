@@ -13,28 +13,40 @@ from memscal import extensions
 from memscal.errors import InputError
 
 if TYPE_CHECKING:
+    from os import PathLike
+
     import pandas as pd
     import xarray
     from matplotlib.figure import Figure
 
-_FORMS = {"dataset": "arrays", "frame": "data frame", "correlated": "covariance of parameters"}
+#: Dots of a figure in a notebook, per inch.
+_IN_A_NOTEBOOK = 100.0
 
 
-class Result:
-    """A result that prints, tabulates and draws itself.
+class Drawn:
+    """A result that draws itself, by the function that stands beside its class."""
+
+    def plot(self, **options: Any) -> Figure:
+        """Draw the result; the figure is returned, and nothing is shown or written."""
+        module, _, function = extensions.VIEWS[type(self).__name__][1].rpartition(".")
+        figure: Figure = getattr(extensions.module(module), function)(self, **options)
+        return figure
+
+
+class Told:
+    """A result that prints itself.
 
     The module of its summary has the functions ``tables(result)``, ``mapping(result)`` and, where
-    there is one, ``answer(result)``, ``dataset(result)``, ``frame(result)`` and
-    ``correlated(result)``.
+    there is one, ``answer(result)``.
     """
 
     def tables(self) -> list[Any]:
         """Return the tables of the result, those without rows left out."""
-        return [table for table in self._shown_as("tables") if table.rows]
+        return [table for table in _shown_as("tables", self) if table.rows]
 
     def answer(self) -> str:
         """Return what the result says, in about two lines; empty where only its tables do."""
-        answer = getattr(self._summary_module(), "answer", None)
+        answer = getattr(_summary_module(self), "answer", None)
         return str(answer(self)) if answer else ""
 
     def summary(self) -> str:
@@ -48,52 +60,76 @@ class Result:
     def _repr_html_(self) -> str:
         lines = "<br>\n".join(map(escape, self.answer().splitlines()))
         blocks = [f"<p>{lines}</p>"] if lines else []
-        return "\n".join([*blocks, *(table.html() for table in self.tables())])
+        blocks += [table.html() for table in self.tables()]
+        if isinstance(self, Drawn):
+            image = extensions.hook("html_image")(self.plot(), "png", _IN_A_NOTEBOOK)
+            blocks.append(f'<img alt="Figure of a {type(self).__name__}" src="{image}">')
+        return "\n".join(blocks)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return values with standard uncertainties and units, as JSON holds them."""
-        return dict(self._shown_as("mapping"))
+        """Return values with standard uncertainties and units, as JSON holds them.
 
-    def to_xarray(self) -> xarray.Dataset:
-        """Return the arrays on their axes, each with its unit, in SI units (needs xarray)."""
-        dataset: xarray.Dataset = self._shown_as("dataset")
-        return dataset
+        The keys stand in the description of the result's class.
+        """
+        return dict(_shown_as("mapping", self))
+
+    def report(self, path: str | PathLike[str] | None = None) -> str:
+        """Return the result as an HTML page without other files, network or scripts.
+
+        Parameters
+        ----------
+        path : path, optional
+            Where the page is written, too; a file there is replaced.
+        """
+        page = str(extensions.hook("html_report")(self))
+        if path is not None:
+            extensions.hook("atomic_write_bytes")(path, page.encode("utf-8"), overwrite=True)
+        return page
+
+
+class Shown(Drawn, Told):
+    """A result that prints and draws itself."""
+
+
+class Tabulated(Told):
+    """A result whose module has ``frame(result)``."""
 
     def to_dataframe(self) -> pd.DataFrame:
-        """Return the result as a table of numbers, units in the names of columns (needs pandas)."""
-        return self._shown_as("frame")
+        """Return the result as a table of numbers, with their units (needs pandas)."""
+        return _shown_as("frame", self)
+
+
+class Correlated(Told):
+    """A result whose module has ``correlated(result)``."""
 
     def ufloats(self) -> dict[str, Any]:
         """Return the parameters as correlated numbers of the package uncertainties, in SI units."""
-        return dict(self._shown_as("correlated"))
+        return dict(_shown_as("correlated", self))
 
-    def plot(self, **options: Any) -> Figure:
-        """Draw the result; the figure is returned, and nothing is shown or written."""
-        name = extensions.VIEWS[type(self).__name__][1]
-        if not name:
-            raise InputError(f"There is no figure of a {type(self).__name__}.")
-        module, _, function = name.rpartition(".")
-        figure: Figure = getattr(extensions.module(module), function)(self, **options)
-        return figure
 
-    def report(self) -> str:
-        """Return the result as an HTML page without other files, network or scripts."""
-        return str(extensions.hook("html_report")(self))
+class Gridded(Told):
+    """A result whose module has ``dataset(result)``."""
 
-    def _summary_module(self) -> Any:
-        return extensions.module(extensions.VIEWS[type(self).__name__][0])
+    def to_xarray(self) -> xarray.Dataset:
+        """Return the arrays on their axes, each with its unit, in SI units (needs xarray)."""
+        dataset: xarray.Dataset = _shown_as("dataset", self)
+        return dataset
 
-    def _shown_as(self, form: str) -> Any:
-        function = getattr(self._summary_module(), form, None)
-        if function is None:
-            raise InputError(
-                f"A {type(self).__name__} has no {_FORMS[form]}.",
-                cure="Use summary() or to_dict().",
-            )
-        try:
-            return function(self)
-        except ModuleNotFoundError as error:
-            raise InputError(
-                f"{error.name} is not installed.",
-                cure='Install it with the extra "interop": pip install "memscal[interop]".',
-            ) from error
+
+class Result(Shown, Tabulated, Correlated, Gridded):
+    """A result that shows itself in every way."""
+
+
+def _summary_module(result: Told) -> Any:
+    return extensions.module(extensions.VIEWS[type(result).__name__][0])
+
+
+def _shown_as(form: str, result: Told) -> Any:
+    try:
+        return getattr(_summary_module(result), form)(result)
+    except ModuleNotFoundError as error:
+        raise InputError(
+            f"{error.name} is not installed.",
+            cure='Install it with the extra "interop": pip install ".[interop]" in memscal\'s '
+            "folder.",
+        ) from error

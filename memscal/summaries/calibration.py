@@ -25,9 +25,11 @@ from memscal.model.quantities import (
 from memscal.model.scan import Scan
 from memscal.model.stress import StressProfile
 from memscal.summaries.declared import (
+    DataFrame,
     Dataset,
     correlated_parameters,
     members,
+    parameter_frame,
     parameter_json,
     parameters_json,
     record_arrays,
@@ -206,6 +208,11 @@ def dataset(result: Calibrated) -> Dataset:
         | record_arrays(records.FIELD, apparatus.field, field),
         attrs={"title": sensor_title(apparatus)},
     )
+
+
+def frame(result: Calibrated) -> DataFrame:
+    """Return a row for each parameter, with its standard uncertainty and unit."""
+    return parameter_frame(apparatus_of(result).parameters)
 
 
 def correlated(result: Calibrated) -> Values:

@@ -155,6 +155,18 @@ def record_arrays(
     return variables
 
 
+def parameter_frame(parameters: ParameterSet) -> DataFrame:
+    """Return a row for each parameter, in its SI unit."""
+    import pandas as pd
+
+    columns = {
+        "value": parameters.values,
+        "standard_uncertainty": np.sqrt(np.diag(parameters.covariance)),
+        "unit": [parameter_quantity(parameters, name).si_unit for name in parameters.names],
+    }
+    return pd.DataFrame(columns, index=pd.Index(parameters.names, name="name"))
+
+
 def correlated_numbers(
     names: Sequence[str], values: Sequence[float] | FloatArray, covariance: FloatArray
 ) -> Values:

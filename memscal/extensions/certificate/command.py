@@ -16,7 +16,7 @@ Examples:
 
 \b
 docs/certificate.md describes lab.toml; calibration_data has an example.
-A PDF needs the extra certificate: pip install "memscal[certificate]".
+A PDF needs the extra certificate: pip install ".[certificate]".
 """
 
 _FORM = out.FigurePath((".html", ".pdf", ".xml"))

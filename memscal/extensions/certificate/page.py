@@ -284,7 +284,7 @@ def certificate_pdf(certificate: Certificate, page: str, xml: bytes) -> bytes:
     try:
         import weasyprint
     except (ImportError, OSError) as error:
-        cure = 'Install the extra "certificate" (pip install "memscal[certificate]"), or write'
+        cure = 'Install the extra "certificate" (pip install ".[certificate]"), or write'
         raise MemscalError(
             f"WeasyPrint, which makes the PDF, cannot be used: {error}.",
             cure=f"{cure} .html and print it.",

@@ -14,7 +14,7 @@ from memscal.errors import InputError, MemscalError
 from memscal.formats.opened import Scans
 from memscal.model.apparatus import ApparatusRadial, ParameterSet
 from memscal.model.checks import Message, QualityCheck
-from memscal.model.result import Result
+from memscal.model.result import Correlated, Tabulated
 from memscal.model.scan import Scan
 from memscal.parallel import cores, shared
 from memscal.progress import Listener, Task, reported
@@ -23,7 +23,7 @@ _Result = TypeVar("_Result")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class FleetCalibration(Result):
+class FleetCalibration(Tabulated, Correlated):
     """The calibration of one scan of many, without its fields, or its error.
 
     ``pandas.concat(result.to_dataframe() for result in results)`` is the table of all scans; of

@@ -6,7 +6,7 @@ import numpy as np
 
 from memscal.model.arrays import FloatArray, keyword_array_record
 from memscal.model.checks import Message
-from memscal.model.result import Result
+from memscal.model.result import Shown
 
 #: A value farther from the median is an outlier, in robust standard deviations: of a million
 #: normal values one; and how much more is allowed where the deviation is that of few values.
@@ -16,7 +16,7 @@ _TO_SIGMA = 1.4826  # of a normal law's median absolute deviation
 
 
 @keyword_array_record
-class FleetResults(Result):
+class FleetResults(Shown):
     """Sensors in the order of their batch; arrays have NaN where a scan has an error.
 
     ``conversion_constant`` is in ``unit``, ``gaussian_sigma`` and the places on a wafer are in mm,

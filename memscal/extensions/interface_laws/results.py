@@ -8,7 +8,7 @@ from memscal.friction.results import BoundedEstimate
 from memscal.model.arrays import FloatArray, array_record, value_record
 from memscal.model.bayes_factor import POSITIVE, BayesFactor
 from memscal.model.checks import Message
-from memscal.model.result import Result
+from memscal.model.result import Shown
 
 
 @value_record
@@ -81,7 +81,7 @@ class LawComparison:
 
 
 @array_record
-class InterfaceComparison(Result):
+class InterfaceComparison(Shown):
     """Laws of the interface against an effective friction coefficient, by evidence.
 
     ``macroscopic`` is the coefficient at which the interface slips and its standard uncertainty.

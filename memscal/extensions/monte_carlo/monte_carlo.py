@@ -31,7 +31,7 @@ from memscal.estimation.reference_spectra import RECTANGLE, law_at_once, rod_spe
 from memscal.model.arrays import Arrays, FloatArray, array_record, value_record
 from memscal.model.checks import OUTLIER_WEIGHT, Message
 from memscal.model.notation import VOLTS, Reading
-from memscal.model.result import Result
+from memscal.model.result import Tabulated
 from memscal.model.scan import Scan
 from memscal.parallel import require_workers, shared, single_threaded
 from memscal.progress import Listener, Task, reported
@@ -239,7 +239,7 @@ class BudgetComparison:
 
 
 @array_record
-class MonteCarlo(Result):
+class MonteCarlo(Tabulated):
     """Draws of a calibration, from :func:`monte_carlo`; ``to_dataframe()`` holds them.
 
     Parameters

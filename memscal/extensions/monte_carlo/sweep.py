@@ -9,12 +9,12 @@ from memscal.deconvolution.division import Regulariser, WhiteNoise, WhiteNoiseDr
 from memscal.errors import FitError
 from memscal.model.arrays import FloatArray, array_record
 from memscal.model.notation import VOLTS, Reading
-from memscal.model.result import Result
+from memscal.model.result import Gridded, Shown
 from memscal.progress import Task
 
 
 @array_record
-class Sweep(Result):
+class Sweep(Shown, Gridded):
     """Results against the noise amplitude.
 
     Parameters

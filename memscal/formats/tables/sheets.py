@@ -92,7 +92,7 @@ def installed(library: str, what: str, extra: str) -> Any:
     except ModuleNotFoundError as error:
         raise InputError(
             f"{what} is read by {library.partition('.')[0]}, which is not installed.",
-            cure=f'Install it with the extra "{extra}": pip install "memscal[{extra}]"',
+            cure=f'Install it with the extra "{extra}": pip install ".[{extra}]"',
         ) from error
 
 

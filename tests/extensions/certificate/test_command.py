@@ -27,5 +27,5 @@ def test_a_certificate_is_replaced_only_if_forced_and_is_told_as_json(run, input
 
 def test_without_weasyprint_the_pdf_is_refused_with_the_extra(run, inputs, monkeypatch):
     monkeypatch.setitem(sys.modules, "weasyprint", None)
-    run("certificate", *inputs, "-o", "c.pdf").exits(3, "memscal[certificate]")
+    run("certificate", *inputs, "-o", "c.pdf").exits(3, ".[certificate]")
     run("certificate", *inputs, "-o", "c.html").exits(0)

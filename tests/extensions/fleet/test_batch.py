@@ -223,7 +223,7 @@ def test_a_folder_is_listed_by_name_and_a_list_may_have_commas(fleet, folder):
 def test_a_missing_extra_is_named(module, line, monkeypatch, fleet, results, folder, run):
     monkeypatch.setitem(sys.modules, module, None)
     words = line.format(scans=fleet / "scans", results=results).split()
-    run(*words).exits(3, "is not installed", 'pip install "memscal[fleet]"')
+    run(*words).exits(3, "is not installed", 'pip install ".[fleet]"')
 
 
 def test_a_scheduler_that_does_not_answer_is_an_error(monkeypatch, fleet, folder, run):

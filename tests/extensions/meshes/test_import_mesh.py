@@ -54,4 +54,4 @@ def test_the_file_that_holds_the_numbers_of_a_mesh_is_an_input_too(run, folder):
 def test_without_meshio_it_is_named(run, mesh, monkeypatch):
     monkeypatch.setitem(sys.modules, "meshio", None)
     refused = run("import", mesh, "-o", "film.h5", *MESH, "--sigma", "S")
-    refused.exits(3, 'pip install "memscal[fem-io]"')
+    refused.exits(3, 'pip install ".[fem-io]"')
