@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from memscal.cli.failures import DONE, REFUSED, debug_option
+from memscal.cli.failures import DONE, REFUSED, debug_option, failure_object
 from memscal.cli.options import FILE, json_option
 from memscal.cli.output import emit_json, emit_tables, error
 from memscal.summaries.table import Table
@@ -30,13 +30,16 @@ def command(file: Path, as_json: bool) -> int:
 
     findings = check(file)
     passed = all(finding.passed for finding in findings)
+    problem = f"{file} is not in order: see {findings[-1].name}."
     if as_json:
+        refusal = {} if passed else {"error": failure_object("FormatError", REFUSED, problem)}
         emit_json(
             {
                 "schema_version": "1",
                 "file": str(file),
                 "passed": passed,
                 "findings": [vars(finding) for finding in findings],
+                **refusal,
             }
         )
     else:
@@ -45,5 +48,5 @@ def command(file: Path, as_json: bool) -> int:
         emit_tables(Table(str(file), ("step", "result", "finding"), rows, failed))
     if passed:
         return DONE
-    error(f"{file} is not in order: see {findings[-1].name}.")
+    error(problem)
     return REFUSED

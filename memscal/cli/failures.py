@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 
 import click
 
-from memscal.cli.output import error, message, unprinted, warn
+from memscal.cli.output import emit_json, error, message, unprinted, warn
 from memscal.errors import MemscalError
 from memscal.model.checks import QualityCheck
 
@@ -29,12 +29,16 @@ _UNPRINTED = (errno.EPIPE, errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, e
 
 _Command = TypeVar("_Command", bound=Callable[..., Any])
 
+Described = dict[str, Any]
+"""A failure: class, problem, why, cure and exit code."""
+
 
 @dataclass
 class Session:
-    """State of one run of the program: whether tracebacks are shown."""
+    """State of one run of the program: whether tracebacks are shown, and an object was printed."""
 
     debug: bool = False
+    printed: bool = False
 
 
 def _set_debug(ctx: click.Context, _: click.Parameter, debug: bool) -> None:
@@ -102,51 +106,65 @@ def _interruptible() -> Iterator[list[int]]:
 def guarded(command: click.Command, arguments: Sequence[str] | None) -> int:
     """Run a command; return its exit code, or that of its failure after saying what it was."""
     session = Session()
-    came = []
+    given = sys.argv[1:] if arguments is None else arguments
+    came: list[int] = []
     with warnings.catch_warnings():
         warnings.showwarning = _show_warning
         try:
             with _interruptible() as came:
-                code = command.main(
-                    arguments, prog_name="memscal", standalone_mode=False, obj=session
-                )
-                return code if isinstance(code, int) else DONE
-        except click.UsageError as failure:
-            failure.show()
-            return USAGE
+                done = command.main(given, prog_name="memscal", standalone_mode=False, obj=session)
+                return done if isinstance(done, int) else DONE
         except (Exception, KeyboardInterrupt) as failure:  # noqa: BLE001 - the last resort
-            if session.debug:
+            if session.debug and not isinstance(failure, click.UsageError):
                 import traceback
 
                 click.echo(traceback.format_exc(), file=sys.stderr, nl=False)
-            return _reported(failure, came)
+            described = _reported(failure, came)
+        # A usage error is raised before options have values: the flag is looked for as typed.
+        if described and "--json" in given and not session.printed:
+            emit_json({"error": described})
+        return int(described.get("exit_code", DONE))
 
 
-def _reported(failure: BaseException, came: Sequence[int]) -> int:
-    """Say what a failure was; return its exit code."""
+def failure_object(kind: str, code: int, problem: str, why: str = "", cure: str = "") -> Described:
+    """Return a failure as the object that ``--json`` prints of it."""
+    return {"class": kind, "problem": problem, "why": why, "cure": cure, "exit_code": code}
+
+
+def _reported(failure: BaseException, came: Sequence[int]) -> Described:
+    """Say what a failure was; return it as an object, empty where it is none."""
+    if isinstance(failure, click.UsageError):
+        failure.show()
+        cure = f"See {failure.ctx.command_path} --help." if failure.ctx else ""
+        return failure_object("UsageError", USAGE, failure.format_message(), cure=cure)
     if isinstance(failure, click.Abort | KeyboardInterrupt):
         if not isinstance(failure.__cause__, EOFError):
-            message("Interrupted. Nothing was left half-written.")
-            return 128 + came[0] if came else INTERRUPTED
+            problem = "Interrupted. Nothing was left half-written."
+            message(problem)
+            return failure_object("Interrupted", 128 + came[0] if came else INTERRUPTED, problem)
         failure = failure.__cause__
     if isinstance(failure, OSError) and failure.filename is None and failure.errno in _UNPRINTED:
         # click printed a help text; a reader that goes away is no failure.
         away = failure.errno == errno.EPIPE
         failure = unprinted(failure)
         if away:
-            return DONE
+            return {}
+    kind = type(failure).__name__
     if isinstance(failure, MemscalError):
-        error(failure.problem, failure.why, failure.cure)
-        return failure.exit_code
-    if isinstance(failure, MemoryError):
+        told = failure.problem, failure.why, failure.cure
+        code = failure.exit_code
+    elif isinstance(failure, MemoryError):
         cure = "Close other programs, or give a scan with fewer points."
-        error("The computer ran out of memory.", cure=cure)
-        return INTERNAL
-    text = " ".join(str(failure).split())
-    fault = type(failure).__name__ + (f" ({text})" if text else "")
-    cure = "Please report it, with what `memscal --debug` and the same arguments print."
-    error(f"memscal failed by a fault of its own, not of its input: {fault}.", cure=cure)
-    return INTERNAL
+        told = "The computer ran out of memory.", "", cure
+        code = INTERNAL
+    else:
+        text = " ".join(str(failure).split())
+        fault = kind + (f" ({text})" if text else "")
+        cure = "Please report it, with what `memscal --debug` and the same arguments print."
+        told = f"memscal failed by a fault of its own, not of its input: {fault}.", "", cure
+        code = INTERNAL
+    error(*told)
+    return failure_object(kind, code, *told)
 
 
 def _show_warning(message: Warning | str, category: type[Warning], *_: Any, **__: Any) -> None:

@@ -71,6 +71,10 @@ def _discard_stdout() -> None:
 def emit_json(value: Mapping[str, Any]) -> None:
     """Print one object of standard JSON; numbers that are not finite are refused."""
     emit(json.dumps(value, indent=2, allow_nan=False))
+    context = click.get_current_context(silent=True)
+    if context is not None:
+        # What fails after this does not print a second object.
+        context.obj.printed = True
 
 
 def message(text: str) -> None:

@@ -150,6 +150,27 @@ def test_running_out_of_memory_is_said_so(run, scan, monkeypatch):
     run("calibrate", scan).exits(70, "out of memory")
 
 
+@pytest.mark.parametrize(
+    ("failure", "kind", "code"),
+    [
+        (RuntimeError("flux"), "RuntimeError", 70),
+        (MemoryError(), "MemoryError", 70),
+        (KeyboardInterrupt(), "Interrupted", 130),
+    ],
+)
+def test_json_of_any_failure_is_one_object(run, scan, monkeypatch, failure, kind, code):
+    monkeypatch.setattr(CALIBRATE, raising(failure))
+    error = run("calibrate", scan, "--json").exits(code).json["error"]
+    assert (error["class"], error["exit_code"]) == (kind, code)
+
+
+def test_what_fails_after_the_results_are_printed_prints_no_second_object(run, monkeypatch):
+    monkeypatch.setattr("memscal.formats.files.os.replace", raising(KeyboardInterrupt()))
+    monkeypatch.setattr("memscal.formats.files.os.link", raising(KeyboardInterrupt()))
+    done = run("reference", "rod", "-o", "rod.h5", "--json").exits(130, "Interrupted")
+    assert "error" not in done.json
+
+
 @pytest.fixture
 def meanwhile(monkeypatch):
     """Let something happen while the calibration is computed."""

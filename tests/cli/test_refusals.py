@@ -1,5 +1,6 @@
 """Command lines that are refused: by exit code, with words that lead on, and nothing written."""
 
+import re
 import shlex
 import shutil
 from pathlib import Path
@@ -23,6 +24,11 @@ PARTS = {
     "film": "--load 1 --radius 0.25 --young-modulus 2.2 --poisson-ratio 0.5",
     "reference": "-o a.h5 --format reference --r-unit mm --sigma-unit MPa --load 1",
 }
+
+#: "1 points", "a int", "an number".
+FAULTS_OF_GRAMMAR = re.compile(
+    r"(?<![-.])\b1 (?!is\b)[a-z]+s\b|\ba [aeio][a-z]+|\ban [b-df-gj-np-tv-z][a-z]+"
+)
 
 TWICE = "Two outputs"
 WANT = "--want and --vary go together"
@@ -193,9 +199,15 @@ def refused(run, scan, artifact, folder):
 
     def refused_(code, line, *words):
         before = {path: path.read_bytes() for path in folder.iterdir()}
-        done = run(*shlex.split(Template(line).substitute(PARTS))).exits(code, *words)
-        assert done.out == ""
+        arguments = shlex.split(Template(line).substitute(PARTS))
+        done = run(*arguments, "--json").exits(code, *words)
+        assert done.json.keys() == {"error"}
+        error = done.json["error"]
+        assert error.keys() == {"class", "problem", "why", "cure", "exit_code"}
+        assert (error["exit_code"], error["class"].endswith("Error")) == (code, True)
+        assert error["problem"].rpartition("\x1b")[2] in done.err
         assert "\x1b" not in done.err
+        assert not FAULTS_OF_GRAMMAR.findall(done.err)
         assert {path: path.read_bytes() for path in folder.iterdir()} == before
 
     return refused_
