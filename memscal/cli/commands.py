@@ -39,7 +39,7 @@ class LazyGroup(click.Group):
         found, command, rest = super().resolve_command(ctx, args)
         if command is not None and not ctx.resilient_parsing:
             inner = click.Context(command, ctx, found)
-            given = command.make_parser(inner).parse_args([*rest])[2]
+            ctx.meta["memscal.words"], _, given = command.make_parser(inner).parse_args([*rest])
             for option in given:
                 if given.count(option) > 1 and not (
                     option.multiple or option.type.name == "boolean"

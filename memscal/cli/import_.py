@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from memscal.cli import output as out
+from memscal.cli.failures import DONE
 from memscal.cli.options import (
     FILE,
     FILM_NUMBERS,
@@ -37,6 +38,7 @@ from memscal.summaries.table import readable
 if TYPE_CHECKING:
     from memscal.formats.tables.reference import ImportedProfile
     from memscal.formats.tables.scan import ImportedScan
+    from memscal.model.checks import Message
 
 _SHARED = ("r_unit", "sigma", "sigma_unit", "shear", "sign", "shear_sign", "value", "solver")
 _TABLE_ONLY = ("r",)
@@ -47,7 +49,7 @@ _SIGN = click.Choice(["1", "-1"])
 
 def _read_reference(path: Path, mesh: bool, options: Options) -> ImportedProfile:
     """Read the reference with the options given; for the others the library's defaults hold."""
-    setting = _stated(options, (*_SHARED, "load")) | _set_up(options)
+    setting = _stated(options, (*_SHARED, "load", "film", "indenter"))
     if not mesh:
         from memscal.formats.tables.reference import read_reference_table
 
@@ -72,6 +74,8 @@ Examples:
   memscal import current.csv -o scan.h5 --x x --u current
   memscal import scan.xlsx -o scan.h5 --sheet Data --x Weg --u Spannung --noise 0.04 --missing n.a.
   memscal import log.csv -o scan.h5 --x x --u U --load-column F --holds --figure holds.png
+  memscal import die_00.csv -o die_00.h5 --x x --u U --load 1 --save-recipe recipe.toml
+  memscal import dies/*.csv -o scans --recipe recipe.toml --name-pattern "die_{row}_{col}"
   memscal import fem.csv -o rod.h5 --format reference --r r --r-unit mm
       --sigma S33 --sigma-unit MPa --sign -1 --load 1
   memscal import fem.vtu -o rod.h5 --format reference --r-unit mm
@@ -84,6 +88,13 @@ empty cells and the words nan, na, n/a, #n/a, nat, null, none and -. Workbooks a
 extra tables: pip install ".[tables]"; TDMS needs the extra recorded.
 Meshes (.vtu, .vtk, .xdmf) need the extra fem-io: pip install ".[fem-io]".
 """
+
+
+def _take_recipe(context: click.Context, _: click.Parameter, path: Path | None) -> None:
+    """Take a recipe's words as defaults of the options that come after this one."""
+    if path:
+        hook("read_recipe")(context, path)
+
 
 _CELL_NAMES = {"name": "load_cell", "serial_number": "load_cell_serial"}
 _SENSOR_NAMES = {"name": "sensor_name", "model": "sensor_model", "channel": "channel"}
@@ -103,8 +114,33 @@ _NEEDED_WITH_MESH = ("r_unit", "sigma_unit")
 
 
 @click.command("import", epilog=EXAMPLES)
-@click.argument("table", type=FILE)
-@option("-o --output", FILE, required=True, metavar="OUT")("Scan or reference to write.")
+@click.argument("tables", type=FILE, nargs=-1, required=True, metavar="TABLE|FOLDER...")
+@option("-o --output", FILE, required=True, metavar="OUT|FOLDER")(
+    "Scan or reference to write; of several tables the folder, which has TABLE.h5 of each."
+)
+@option(
+    "--recipe",
+    FILE,
+    callback=_take_recipe,
+    is_eager=True,
+    expose_value=False,
+    metavar="recipe.toml",
+)("File (TOML) with what is not given here.")
+@option("--save-recipe", FILE, metavar="recipe.toml")(
+    "File to write what was given to, for --recipe of import and batch."
+)
+@option("--name-pattern", "PATTERN")(
+    "Scan: what the names of tables state, such as die_{row}_{col}: {row}, {col}, or {x}, {y} in "
+    "mm, the place on the wafer (to FOLDER/manifest.csv); {sensor} its name, which is otherwise "
+    "the table's; {any} is skipped."
+)
+@option("--die-pitch", click.FloatRange(0, min_open=True), nargs=2, metavar="MM MM")(
+    "Scan: distance of columns and of rows on the wafer, in mm.  [default: places count dies]"
+)
+@option("--resume", is_flag=True)("Several tables: keep the scans that are there.")
+@option("--dry-run", is_flag=True)(
+    "Read every table, say what would be written, and write nothing."
+)
 @option("--format kind", click.Choice(["scan", "reference"]), "scan")(
     "What it holds: measured points, or the base stress of a FEM calculation."
 )
@@ -273,43 +309,46 @@ _NEEDED_WITH_MESH = ("r_unit", "sigma_unit")
 @option("--delimiter", "CHAR")("What separates columns, or TAB; found from the table by default.")
 @option("--decimal", click.Choice([".", ","]))("Decimal mark; found from the table by default.")
 @output_options
+@click.pass_context
 def command(
-    table: Path, output: Path, kind: str, as_json: bool, force: bool, **options: Any
-) -> None:
-    """Convert a TABLE or a mesh (VTU, VTK, XDMF) to a scan or a reference.
+    context: click.Context,
+    /,
+    tables: tuple[Path, ...],
+    output: Path,
+    kind: str,
+    as_json: bool,
+    force: bool,
+    save_recipe: Path | None,
+    resume: bool,
+    dry_run: bool,
+    **options: Any,
+) -> int:
+    """Convert a TABLE or a mesh (VTU, VTK, XDMF) to a scan or a reference, or several of them.
 
     Tables are text (CSV, SPEC), .xlsx, Parquet, HDF5 (its columns are paths) and TDMS.
 
     The options state the film and the indenter, which a table does not, and units that it does not
     state; a scan to be calibrated with a reference of its own needs no film, indenter or load.
     Readings are kept as they are. What was read, and what was pressed on what, is printed and
-    kept in the notes of the file.
+    kept in the notes of the file. A table of several that is refused is named with its cause, the
+    others are written, and the exit code is 1.
     """
-    mesh = hook("is_mesh")(table)
-    given = ("repeat", "missing", "figure", "holds", "position_errors_by_repeat")
-    options |= {name: options[name] or None for name in given}
-    _check_usage(table, kind, mesh, options)
-    options |= {name: int(options[name]) for name in _SIGNS if options[name] is not None}
+    if len(tables) > 1 or tables[0].is_dir() or output.is_dir():
+        code: int = hook("import_tables")(context, options)
+        return code
+    if resume:
+        raise click.UsageError("--resume belongs to several tables, whose -o is a folder.")
+    options = prepared(tables, kind, options)
+    table = tables[0]
     figures = options["figure"] or ()
-    laboratory = options["laboratory"]
-    inputs = [*hook("with_drawn_in")(table), laboratory]
-    out.prove_writable([output, *figures], force=force, inputs=inputs)
+    inputs = [*hook("with_drawn_in")(table), options["lab"]]
+    out.prove_writable([output, *figures, save_recipe], force=force, inputs=inputs)
     with together():
-        if kind == "scan":
-            from memscal.formats.scan import write_scan
-
-            with out.working("Reading"):
-                scan = _read_scan(table, options)
-            notes = scan.messages
-            write_scan(with_laboratory(laboratory, scan), output, overwrite=force)
-            if scan.holds is not None:
-                out.write_files(out.rendered(scan.holds.plot, figures), force=force)
-        else:
-            from memscal.formats.reference import write_reference
-
-            reference = _read_reference(table, mesh, options)
-            notes = reference.notes
-            write_reference(reference.profile, output, overwrite=force)
+        with out.working("Reading"):
+            notes = convert(table, None if dry_run else output, kind, options, force=force)
+        if save_recipe and not dry_run:
+            text = hook("recipe_text")(context)
+            out.write_files({save_recipe: text.encode()}, force=force)
         warnings = [note for note in notes if note.severity == "warning"]
         if as_json:
             out.emit_json(
@@ -323,7 +362,40 @@ def command(
         else:
             out.emit(readable("\n".join(note.text for note in notes if note not in warnings)))
     out.show_messages(warnings)
-    out.say_written([output])
+    if not dry_run:
+        out.say_written([output, save_recipe])
+    return DONE
+
+
+def prepared(tables: Iterable[Path], kind: str, options: Options) -> Options:
+    """Return the options as tables of a kind are read with them, or say which are wrong."""
+    given = ("repeat", "missing", "figure", "holds", "position_errors_by_repeat")
+    options = options | {name: options[name] or None for name in given}
+    for table in tables:
+        _check_usage(table, kind, hook("is_mesh")(table), options)
+    options |= {name: int(options[name]) for name in _SIGNS if options[name] is not None}
+    return {**options, "film": None, "indenter": None, **_set_up(options)}
+
+
+def convert(
+    table: Path, output: Path | None, kind: str, options: Options, *, force: bool
+) -> Sequence[Message]:
+    """Write what a table or a mesh holds, where there is an output; return the notes on it."""
+    if kind == "reference":
+        from memscal.formats.reference import write_reference
+
+        reference = _read_reference(table, hook("is_mesh")(table), options)
+        if output is not None:
+            write_reference(reference.profile, output, overwrite=force)
+        return reference.notes
+    from memscal.formats.scan import write_scan
+
+    scan = read_table(table, options)
+    if output is not None:
+        write_scan(scan, output, overwrite=force)
+        if scan.holds is not None:
+            out.write_files(out.rendered(scan.holds.plot, options["figure"] or ()), force=force)
+    return scan.messages
 
 
 def _check_usage(path: Path, kind: str, mesh: bool, options: Options) -> None:
@@ -387,15 +459,20 @@ def _set_up(options: Options) -> dict[str, Any]:
     return stated
 
 
-def _read_scan(path: Path, options: Options) -> ImportedScan:
+def read_table(path: Path, options: Options) -> ImportedScan:
+    """Read a scan with options that are prepared."""
     from memscal.formats.tables.scan import ARRAYS, import_table, records_of
     from memscal.model.instrument import LoadCell, StressSensor
 
+    if options["name_pattern"]:
+        name = hook("place_in_name")(path, options)["sensor"]
+        options = {**options, "sensor_name": options["sensor_name"] or name}
     sensor = {field: options[option] for field, option in _SENSOR_NAMES.items()}
     load_cell = {field: options[option] for field, option in _CELL_NAMES.items()}
-    stated = _stated(options, options) | _set_up(options)
+    stated = _stated(options, options)
     stated["sensor"] = StressSensor(**_stated(sensor, _SENSOR_NAMES))
     stated["load_cell"] = LoadCell(**_stated(load_cell, _CELL_NAMES))
     stated["x_error"] = options["position_error"]
     columns = _stated(options, ("x", "u", *ARRAYS))
-    return import_table(path, **columns, **records_of(stated))
+    scan = import_table(path, **columns, **records_of(stated))
+    return with_laboratory(options["lab"], scan)

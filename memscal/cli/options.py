@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
@@ -27,6 +27,7 @@ else:  # generic since click 8.2 only
     _Number = click.ParamType
 
 _Command = Callable[..., Any]
+_Scan = TypeVar("_Scan", bound="Scan")
 _Adder = Callable[[_Command], _Command]
 
 Options = dict[str, Any]
@@ -165,10 +166,10 @@ def figure_option(about: str) -> _Adder:
 def laboratory_option(subject: str) -> _Adder:
     """Return the option of a laboratory's file."""
     about = "Laboratory's file (lab.toml): sensor, load cell, stage, operator, temperature, times."
-    return option("--lab laboratory", FILE, metavar="lab.toml")(subject + about)
+    return option("--lab", FILE, metavar="lab.toml")(subject + about)
 
 
-def with_laboratory(path: Path | None, scan: Scan) -> Scan:
+def with_laboratory(path: Path | None, scan: _Scan) -> _Scan:
     """Return a scan with what a laboratory's file adds to it, where there is one."""
     if path is None:
         return scan

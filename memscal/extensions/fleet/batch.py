@@ -1,8 +1,9 @@
 """Batch of calibrations: shards of scans, each a task and a Parquet file that proves its work."""
 
 import hashlib
+import os
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
 from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
@@ -11,14 +12,19 @@ from itertools import islice
 from pathlib import Path
 
 from memscal.calibration.calibrate import calibrate
+from memscal.cli.import_ import read_table
+from memscal.cli.options import Options
 from memscal.errors import InputError, MemscalError, OutputError
 from memscal.extensions.fleet.many import attempted
+from memscal.extensions.fleet.recipe import place_in_name
 from memscal.extensions.fleet.shards import (
     DIGEST,
     FLEET_SCHEMA_VERSION,
+    TABLE_SUFFIXES,
     FleetScan,
     arrow,
     fleet_row,
+    make_folder,
     manifest_scans,
     read_batch,
     read_shard,
@@ -26,11 +32,12 @@ from memscal.extensions.fleet.shards import (
     write_batch,
     write_shard,
 )
-from memscal.formats.files import ensure_writable, read_bytes
+from memscal.formats.files import HDF5_SUFFIXES, ensure_writable, read_bytes
 from memscal.formats.scan import read_scan
 from memscal.model.arrays import Values
+from memscal.model.checks import Message
 from memscal.model.provenance import timestamp
-from memscal.model.stress import StressProfile
+from memscal.model.scan import Scan
 from memscal.version import __version__
 
 _LONGEST_STEM = 80
@@ -68,37 +75,61 @@ class ShardOutcome:
 class Batch:
     """What is calibrated how: ``options`` are those of :func:`memscal.calibrate`.
 
-    ``source`` is a folder of scans, or a manifest; ``results`` the folder of the results.
-    ``artifacts`` are written of calibrations with a failed check (``failed``), of ``all``, or of
-    ``none``.
+    ``sources`` are scans, or a folder of them, or a manifest; with a ``recipe``, options of
+    ``memscal import``, they are tables.  ``results`` is the folder of the results, ``words`` are
+    all options as they were given.  ``artifacts`` are written of calibrations with a failed check
+    (``failed``), of ``all``, or of ``none``.
     """
 
-    source: Path
+    sources: Sequence[Path]
     results: Path
     options: Values
     artifacts: str
+    words: Values
+    recipe: Options | None = None
     shard_size: int | None = None  # by default from the number of scans
     count: int = 0  # of scans
     version: str = __version__
 
     @cached_property
+    def stated(self) -> dict[str, str]:
+        """Every option in words, by name; a reference counts by the digest of its file."""
+        words = self.words | {"method": self.options["method"].name}
+        for name in ("reference", "alternative"):
+            profile = self.options[name]
+            words[name] = profile and (profile.source or profile.form)
+        return {name: str(value) for name, value in words.items() if value}
+
+    @cached_property
     def options_sha256(self) -> str:
-        """Digest of the options; a reference counts by the digest of its file."""
-        stated = {
-            name: value.source or value.form if isinstance(value, StressProfile) else value
-            for name, value in self.options.items()
-        }
-        return _sha256_of((stated, self.artifacts))
+        """Digest of what is stated of the options."""
+        return _sha256_of(sorted(self.stated.items()))
 
     @property
     def folder(self) -> Path:
         """What the paths of the scans are relative to."""
-        return self.source if self.source.is_dir() else self.source.parent
+        source = self.sources[0]
+        return source if source.is_dir() else source.parent
+
+    def scans(self) -> Iterator[FleetScan]:
+        """Yield what is calibrated: scans or, with a recipe, tables."""
+        return manifest_scans(self.sources, TABLE_SUFFIXES if self.recipe else HDF5_SUFFIXES)
+
+    def read(self, path: Path) -> Scan:
+        """Read a scan, or a table by the recipe."""
+        if self.recipe:
+            return read_table(path, self.recipe)
+        return read_scan(path, accept_altered=self.options.get("accept_altered", False))
+
+    def notes(self, scan: FleetScan) -> Sequence[Message]:
+        """Read a scan or table; return the notes on it."""
+        read = self.read(self.folder / scan.path)
+        return getattr(read, "messages", ())
 
     def shards(self) -> Iterator[Shard]:
         """Yield the shards in their order, listing the scans as they are needed."""
         assert self.shard_size is not None
-        scans = manifest_scans(self.source)
+        scans = self.scans()
         size = self.shard_size
         shards = iter(lambda: tuple(islice(scans, size)), ())
         yield from (Shard(i, i * size, some) for i, some in enumerate(shards))
@@ -107,57 +138,80 @@ class Batch:
         """Return the path of a shard's table."""
         return self.results / "shards" / f"{shard.name}.parquet"
 
-    def prepare(self, *, resume: bool) -> "Batch":
-        """Make the folder of results, if it may be used; count the scans."""
+    def prepare(self, *, resume: bool, force: bool) -> "Batch":
+        """Return the batch with its scans counted, if the folder of results may be used."""
         arrow()
         results = self.results
         count = self._counted()
+        begun = read_batch(results)
         stays = "It may hold results, which are not replaced."
         with suppress(FileNotFoundError, NotADirectoryError):
-            if not resume and any(path.is_file() for path in results.rglob("*")):
+            free = resume or (force and begun)
+            if not free and any(path.is_file() for path in results.rglob("*")):
                 raise OutputError(
                     f"The folder {results} exists.",
                     why=stays,
-                    cure="Continue them with --resume, or give another folder.",
+                    cure="Continue a batch with --resume, repeat it with --force, or give another "
+                    "folder.",
                 )
-        begun_with = read_batch(results).get("shard_size")
+        done = shard_paths(results) if resume else []
+        if done and not force:
+            self._require_same(begun.get("options", {}))
         balanced = min(max(_SMALLEST, -(-count // _SHARDS)), _LARGEST)
-        size = self.shard_size or begun_with or balanced
+        size = self.shard_size or (resume and begun.get("shard_size")) or balanced
         shards = -(-count // size)
-        numbers = [int(path.stem.rpartition("-")[2]) for path in shard_paths(results)]
+        numbers = [int(path.stem.rpartition("-")[2]) for path in done]
         if max(numbers, default=0) >= shards:
             raise OutputError(
                 f"{results} has shard {max(numbers)}; this batch ends at {shards - 1}.",
                 why=stays,
                 cure="Resume with the manifest and the --shard-size that it was begun with.",
             )
-        try:
-            (results / "shards").mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise OutputError(
-                f"The folder {results} cannot be made: {error.strerror}.",
-                cure="Give a folder in which you may write.",
-            ) from error
-        ensure_writable(results / "shards" / "proof")
         return replace(self, shard_size=size, count=count)
+
+    def _require_same(self, before: Mapping[str, str]) -> None:
+        """Refuse to go on with other options than before, and name each."""
+        absent = "not stated"
+        changed = [
+            f"{name}: {before.get(name, absent)}, now {self.stated.get(name, absent)}"
+            for name in {**before, **self.stated}
+            if before.get(name) != self.stated.get(name)
+        ]
+        if changed:
+            raise InputError(
+                f"{self.results} was begun with other options: {'; '.join(changed)}.",
+                why="Nothing was touched.",
+                cure="Give the options as they were, or another folder; --force does all anew.",
+            )
+
+    def begin(self, *, resume: bool) -> None:
+        """Make the folder of results; what an earlier batch left there goes, unless it resumes."""
+        if not resume:
+            for name in ("shards", "artifacts"):
+                shutil.rmtree(self.results / name, ignore_errors=True)
+        make_folder(self.results / "shards")
+        ensure_writable(self.results / "shards" / "proof")
 
     def _counted(self) -> int:
         """Return how many scans there are; refuse a list of which none is there."""
         count = 0
         there = False
         first = ""
-        for scan in manifest_scans(self.source):
+        for scan in self.scans():
             count += 1
             first = first or scan.path
             there = there or (self.folder / scan.path).exists()
-        if not count:
+        source = self.sources[0]
+        if not (self.recipe or first.lower().endswith(HDF5_SUFFIXES)):
             raise MemscalError(
-                f"{self.source} holds no scans.",
-                cure="Give a folder with scans (HDF5), or a manifest with a scan a line.",
+                f"{source} holds no scans, which are HDF5.",
+                why="Tables (CSV, ...) are read by a recipe, which states columns, film and load.",
+                cure="Find the options for one table: memscal import TABLE ... --save-recipe "
+                "recipe.toml. Then read them all: memscal batch ... --recipe recipe.toml.",
             )
         if not there:
             raise InputError(
-                f"None of the {count} scans that {self.source.name} lists is there; the first is "
+                f"None of the {count} scans that {source.name} lists is there; the first is "
                 f"{first[:200]!r}.",
                 why=f"Paths are relative to {self.folder}.",
                 cure="List a path a line, or give a table with a column path, separated by commas.",
@@ -166,7 +220,8 @@ class Batch:
 
     def run(self, executor: Executor, most: Callable[[], int]) -> Iterator[ShardOutcome]:
         """Yield the outcomes of the shards as they are done, of which ``most()`` are in flight."""
-        write_batch(self.results, {"scans": self.count, "shard_size": self.shard_size})
+        stated = {"scans": self.count, "shard_size": self.shard_size, "options": self.stated}
+        write_batch(self.results, stated)
         shards = self.shards()
         tasks = set[Future[ShardOutcome]]()
         lost = []
@@ -254,17 +309,20 @@ def _row(batch: Batch, shard: Shard, i: int) -> Values:
     row = {
         "place": shard.first + i,
         **asdict(item),
+        "path": _relative(path, batch.results),
         "passed": False,
         "calibrated_at": timestamp(),
         "options_sha256": batch.options_sha256,
         "version": batch.version,
         "error": None,
     }
-    accepted = batch.options.get("accept_altered", False)
-    scan = attempted(item.path, lambda: read_scan(path, accept_altered=accepted))
+    scan = attempted(item.path, lambda: batch.read(path))
     if isinstance(scan, MemscalError):
         return row | _error_columns(scan) | {"input_sha256": _sha256_of_file(path)}
-    row |= asdict(scan.sensor) | {"sensor": scan.sensor.name, "start_time": scan.start_time}
+    if batch.recipe and batch.recipe["name_pattern"] and item.wafer_x is None:
+        row |= place_in_name(path, batch.recipe)
+    named = {"sensor": item.sensor or scan.sensor.name, "start_time": scan.start_time}
+    row |= asdict(scan.sensor) | named
     row["input_sha256"] = scan.source and scan.source.sha256
     apparatus = attempted(
         item.path, lambda: calibrate(scan, other=False, **batch.options).apparatus
@@ -278,6 +336,13 @@ def _row(batch: Batch, shard: Shard, i: int) -> Values:
         (batch.results / artifact).parent.mkdir(parents=True, exist_ok=True)
         apparatus.compact().save(batch.results / artifact, overwrite=True)
     return row | fleet_row(apparatus)
+
+
+def _relative(path: Path, folder: Path) -> str:
+    """Return a path as seen from a folder; on another disk as it is."""
+    with suppress(ValueError):
+        return Path(os.path.relpath(path, folder)).as_posix()
+    return str(path)
 
 
 def _error_columns(error: MemscalError) -> dict[str, str]:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import ExitStack
+from functools import partial
 from operator import attrgetter
 from pathlib import Path
 from time import monotonic
@@ -27,20 +28,24 @@ EXAMPLES = """\b
 Examples:
   memscal batch scans -o results --report scans.html
   memscal batch wafer.csv -o results --resume --method bayesian --artifacts none
+  memscal batch dies/*.csv -o results --recipe recipe.toml --dry-run
   memscal batch wafer.csv -o results --resume --scheduler tcp://node1:8786
   memscal summary results
 """
 
 
 @click.command("batch", epilog=EXAMPLES)
-@click.argument("source", type=FILE, metavar="FOLDER|MANIFEST")
+@click.argument("sources", type=FILE, nargs=-1, required=True, metavar="FOLDER|MANIFEST|SCAN...")
 @option("-o --output results", FILE, metavar="RESULTS", required=True)(
     "Folder of the results, which must not exist yet: tables (Parquet) in RESULTS/shards, "
     "artifacts in RESULTS/artifacts."
 )
+@option("--recipe", FILE, metavar="recipe.toml")(
+    "The inputs are tables, read as this file states, which memscal import --save-recipe writes."
+)
 @option("--resume", is_flag=True)(
-    "Continue in RESULTS: shards stay if their file is whole and is of the same scans, options and "
-    "version; the others are calibrated."
+    "Continue in RESULTS: shards stay if their file is whole and is of the same scans and version; "
+    "the others are calibrated. Other options than before are refused."
 )
 @option("--workers", click.IntRange(1, 512), metavar="N")(
     "Processes on this machine.  [default: one for each core]"
@@ -57,12 +62,16 @@ Examples:
 )
 @calibration_options
 @report_option
-@option("--force", is_flag=True)("Replace the page of --report; results are never replaced.")
+@option("--force", is_flag=True)(
+    "Calibrate all anew, or with --resume what has other options; replace the page of --report."
+)
+@option("--dry-run", is_flag=True)("Read every input, say which are refused, and write nothing.")
 @json_option
 @debug_option
 def command(
-    source: Path,
+    sources: tuple[Path, ...],
     results: Path,
+    recipe: Path | None,
     resume: bool,
     workers: int | None,
     scheduler: str | None,
@@ -70,13 +79,15 @@ def command(
     artifacts: str,
     report: Path | None,
     force: bool,
+    dry_run: bool,
     as_json: bool,
     **settings: Any,
 ) -> int:
-    """Calibrate with every scan in a folder, or with those that a manifest lists.
+    """Calibrate with every scan in a folder, that a manifest lists, or that is named.
 
     A manifest is a text file with the path of a scan a line, relative to its own folder, or a CSV
-    file with a column path and optional wafer_x, wafer_y (mm), the sensor's place on its wafer.
+    file with a column path and optional wafer_x, wafer_y (mm), the sensor's place on its wafer,
+    and sensor, its name. With --recipe they are tables.
 
     Each scan is a row of a table: A, widths, uncertainties, checks, G(r), digests, by the method
     alone that is asked for; a scan that cannot be calibrated has its error there, and the exit
@@ -86,17 +97,26 @@ def command(
     if workers and scheduler:
         raise click.UsageError("--workers and --scheduler exclude each other: give one of them.")
     from memscal.extensions.fleet.batch import Batch
-    from memscal.extensions.fleet.shards import manifest_scans, read_fleet, shard_paths
-    from memscal.progress import span
+    from memscal.extensions.fleet.import_tables import attempt_all
+    from memscal.extensions.fleet.recipe import recipe_of
+    from memscal.extensions.fleet.shards import expanded, read_fleet, shard_paths
 
     chosen = calibration_settings(**settings)
-    source, results = (Path(os.path.realpath(path)) for path in (source, results))
-    batch = Batch(source, results, chosen, artifacts, shard_size)
+    results = Path(os.path.realpath(results))
+    paths = [Path(os.path.realpath(path)) for path in expanded(sources)]
+    words, reading = recipe_of(recipe) if recipe else ({}, None)
+    words |= settings | {"artifacts": artifacts}
+    batch = Batch(paths, results, chosen, artifacts, words, reading, shard_size)
     if report is not None and results not in Path(os.path.realpath(report)).parents:
-        scans = manifest_scans(source) if report.exists() else ()
-        inputs = [source, *(batch.folder / scan.path for scan in scans)]
+        scans = batch.scans() if report.exists() else ()
+        inputs = [*paths, *(batch.folder / scan.path for scan in scans)]
         out.prove_writable([report], force=force, inputs=inputs)
-    batch = batch.prepare(resume=resume)
+    batch = batch.prepare(resume=resume, force=force)
+    if dry_run:
+        numbers = {"scans": batch.count, "shards": len(list(batch.shards()))}
+        jobs = {scan.path: partial(batch.notes, scan) for scan in batch.scans()}
+        return CHECK_FAILED if attempt_all(jobs, numbers, as_json=as_json) else DONE
+    batch.begin(resume=resume)
     start = monotonic()
     out.prove_writable([report], force=force)  # in the folder of results, too, which is there now
     total = batch.count
@@ -109,7 +129,6 @@ def command(
     errors = sum(outcome.errors for outcome in outcomes)
     failed = sum(outcome.failed for outcome in outcomes)
     kept = sum(outcome.kept for outcome in outcomes)
-    seconds = round(monotonic() - start, 1)
     counts = {
         "scans": total,
         "passed": total - errors - failed,
@@ -126,13 +145,7 @@ def command(
         problem = failure
     with together():
         out.write_files(page, force=force)
-        if as_json:
-            stated = {"schema_version": "1", "results": str(results), **counts}
-            out.emit_json(stated | {"time": {"value": seconds, "unit": "s"}})
-        else:
-            rows = [(name.replace("_", " "), str(number)) for name, number in counts.items()]
-            rows.append(("time", span(seconds)))
-            out.emit_tables(Table(f"Batch of {source.name}", ("", ""), rows))
+        _emit(counts, batch, monotonic() - start, as_json)
     out.say_written([results, *page])
     if problem:
         raise problem
@@ -141,6 +154,19 @@ def command(
     what = f"{errors} of {total} scans were not calibrated, {failed} failed a quality check"
     out.warn(f"{what}: memscal summary {results}")
     return CHECK_FAILED
+
+
+def _emit(counts: Mapping[str, int], batch: Batch, seconds: float, as_json: bool) -> None:
+    """Print what came of the scans."""
+    if as_json:
+        told = {"schema_version": "1", "results": str(batch.results), **counts}
+        out.emit_json(told | {"time": {"value": round(seconds, 1), "unit": "s"}})
+        return
+    from memscal.progress import span
+
+    rows = [(name.replace("_", " "), str(number)) for name, number in counts.items()]
+    rows.append(("time", span(seconds)))
+    out.emit_tables(Table(f"Batch of {batch.sources[0].name}", ("", ""), rows))
 
 
 def _outcomes(batch: Batch, workers: int | None, scheduler: str | None) -> Iterator[ShardOutcome]:

@@ -6,12 +6,13 @@ import os
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
+from glob import glob
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from memscal.errors import FormatError, InputError, MemscalError
+from memscal.errors import FormatError, InputError, MemscalError, OutputError
 from memscal.extensions.fleet.results import FleetResults
 from memscal.formats.files import HDF5_SUFFIXES, atomic_write_bytes, read_bytes
 from memscal.formats.tables.sheets import installed
@@ -29,23 +30,40 @@ DIGEST = "memscal_shard_sha256"
 _BATCH = "batch.json"
 _MOST_STATED = 10_000
 _NAMED = 5
+TABLE_SUFFIXES = (".csv", ".tsv", ".txt", ".dat", ".xlsx", ".parquet", ".tdms")
+"""Endings of tables of readings."""
 #: What memscal writes beside scans.
 _RESULTS = (".apparatus", ".stress")
 
 
 @value_record
 class FleetScan:
-    """A scan of a manifest: its path as listed, and the sensor's place on its wafer, in mm."""
+    """A scan of a manifest: its path as listed, the sensor's place on its wafer (mm), its name."""
 
     path: str
     wafer_x: float | None = None
     wafer_y: float | None = None
+    sensor: str = ""
 
 
-def manifest_scans(source: Path) -> Iterator[FleetScan]:
-    """Yield the scans of a folder, by their names, or those that a manifest lists, in its order."""
+def expanded(sources: Iterable[Path]) -> list[Path]:
+    """Return paths with those that patterns such as ``*.csv`` stand for."""
+    paths: list[str | Path] = []
+    for source in sources:
+        paths += sorted(glob(str(source), recursive=True)) or [source]
+    return [Path(path) for path in paths]
+
+
+def manifest_scans(
+    sources: Sequence[Path], suffixes: tuple[str, ...] = HDF5_SUFFIXES
+) -> Iterator[FleetScan]:
+    """Yield several scans, those of a folder, by their names, or of a manifest, in its order."""
+    source = sources[0]
+    if len(sources) > 1:
+        yield from (FleetScan(path.as_posix()) for path in sources)
+        return
     if source.is_dir():
-        yield from _folder_scans(source)
+        yield from _folder_scans(source, suffixes)
         return
     if not source.is_file():
         raise InputError(
@@ -63,11 +81,11 @@ def manifest_scans(source: Path) -> Iterator[FleetScan]:
         ) from error
 
 
-def _folder_scans(folder: Path) -> Iterator[FleetScan]:
+def _folder_scans(folder: Path, suffixes: tuple[str, ...]) -> Iterator[FleetScan]:
     for place, folders, files in os.walk(folder):
         folders.sort()
         for path in (Path(place, name) for name in sorted(files)):
-            if path.suffix.lower() in HDF5_SUFFIXES and not path.stem.endswith(_RESULTS):
+            if path.suffix.lower() in suffixes and not path.stem.endswith(_RESULTS):
                 yield FleetScan(path.relative_to(folder).as_posix())
 
 
@@ -95,7 +113,7 @@ def _listed_scans(name: str, lines: Iterator[str]) -> Iterator[FleetScan]:
             ) from error
         if not row.get("path"):
             raise FormatError(f"{name}, line {number} has no path.", cure="Add it.")
-        yield FleetScan(row["path"], *place)
+        yield FleetScan(row["path"], place[0], place[1], row.get("sensor") or "")
 
 
 def _require_places(name: str, head: Sequence[str]) -> None:
@@ -263,6 +281,17 @@ def read_shard(path: Path, columns: Sequence[str] | None = None) -> Any:
         reason = " ".join(str(error).split())[:200]
         raise FormatError(
             f"{path} is damaged: {reason}", cure="Remove it, and run memscal batch --resume."
+        ) from error
+
+
+def make_folder(folder: Path) -> None:
+    """Make a folder, if it is not there."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(
+            f"The folder {folder} cannot be made: {error.strerror}.",
+            cure="Give a folder in which you may write.",
         ) from error
 
 

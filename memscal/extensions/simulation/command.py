@@ -167,7 +167,7 @@ def _quantity(name: str) -> quantities.Quantity:
     return TRUTH.get(name) or estimated_quantity(name)
 
 
-_ROD_NAMES = ("half_range", "raster", "laboratory")
+_ROD_NAMES = ("half_range", "raster", "lab")
 """The options that only a rod scan alone has."""
 
 EXAMPLES = """\b
@@ -252,7 +252,7 @@ def command(
         _sphere(output or Path("synthetic_experiment"), options, as_json, force)
         return
     output = output or Path("synthetic_scan.h5")
-    laboratory = options["laboratory"]
+    laboratory = options["lab"]
     prove_writable([output], force=force, inputs=[laboratory])
 
     from memscal.extensions.simulation.rod_scan import simulate

@@ -99,7 +99,7 @@ def test_a_row_says_what_a_calibration_says(results, fleet):
     path = fleet / "scans" / "s01.h5"
     row = rows.iloc[1]
     alone = memscal.calibrate(path).apparatus
-    assert row["path"] == "scans/s01.h5"
+    assert row["path"] == "../scans/s01.h5"
     assert (row["sensor"], row["serial_number"]) == ("S1", "W7-001")
     assert row["input_sha256"] == alone.process.input_scan.sha256
     assert (row["wafer_x"], row["wafer_y"], row["passed"]) == (1, 0, alone.passed)
@@ -165,7 +165,8 @@ def test_a_batch_that_is_killed_loses_what_is_under_way_and_resumes(fleet, resul
     assert len(done) < COUNT / SHARD
     resumed = run(*arguments(fleet / "wafer.csv", halfway, "--resume", "--json"))
     assert shards_of(resumed.exits(1))[1] >= 1
-    pd.testing.assert_frame_equal(tables(halfway), tables(results), rtol=1e-9)
+    with_paths = tables(halfway).assign(path=tables(results)["path"])
+    pd.testing.assert_frame_equal(with_paths, tables(results), rtol=1e-9)
 
 
 def test_a_shard_is_done_anew_unless_it_opens_and_its_digest_agrees(copy, run, monkeypatch):
@@ -184,7 +185,11 @@ def test_a_shard_is_done_anew_unless_it_opens_and_its_digest_agrees(copy, run, m
     rows = tables(copy / "results")
     assert list(rows["place"]) == list(range(COUNT))
     assert rows["conversion_constant_errors"][7] > 5 * rows["conversion_constant_errors"][8]
-    anew = run(*line, "--method", "bayesian").exits(1, " of 10 scans, ", " s left, ", " a second")
+    before = {path: path.read_bytes() for path in copy.rglob("*.*")}
+    other = [*line, "--method", "bayesian"]
+    run(*other).exits(3, "method: white-noise, now bayesian")
+    assert {path: path.read_bytes() for path in copy.rglob("*.*")} == before
+    anew = run(*other, "--force").exits(1, " of 10 scans, ", " s left, ", " a second")
     assert shards_of(anew) == (5, 0)
 
 
@@ -206,9 +211,9 @@ def test_a_folder_is_listed_by_name_and_a_list_may_have_commas(fleet, folder):
     for name in ("b/1.h5", "b/1.apparatus.h5", "b/notes.txt", "a.h5", "c,d.nxs"):
         (folder / name).parent.mkdir(exist_ok=True)
         (folder / name).touch()
-    assert [scan.path for scan in manifest_scans(folder)] == ["a.h5", "c,d.nxs", "b/1.h5"]
+    assert [scan.path for scan in manifest_scans([folder])] == ["a.h5", "c,d.nxs", "b/1.h5"]
     (folder / "list.txt").write_text("\ufeff# scans\nc,d.nxs\n\n'a.h5'\n", encoding="utf-8")
-    listed = [scan.path for scan in manifest_scans(folder / "list.txt")]
+    listed = [scan.path for scan in manifest_scans([folder / "list.txt"])]
     assert listed == ["c,d.nxs", "'a.h5'"]
 
 
@@ -260,7 +265,7 @@ def test_a_summary_as_json_is_that_of_the_tables(results, folder, run):
     assert told["error_classes"] == {"InputError": 2, "FormatError": 1}
     failed = [c["name"] for checks in rows["checks"].dropna() for c in checks if not c["passed"]]
     assert told["checks"] == {name: failed.count(name) for name in failed}
-    (reason,) = [o["reason"] for o in told["outliers"] if o["path"] == f"scans/s{LARGE:02}.h5"]
+    (reason,) = [o["reason"] for o in told["outliers"] if o["path"] == f"../scans/s{LARGE:02}.h5"]
     z = (a[LARGE] - a.median()) / spread
     assert reason.startswith(f"A {z:.1f} deviations above the median")
     assert json.dumps(told)
@@ -272,7 +277,7 @@ def test_a_summary_of_several_units_is_refused(copy, run):
     place = table.schema.get_field_index("unit")
     units = pa.array(["nA/Pa"] * len(table))
     pq.write_table(table.set_column(place, table.schema.field(place), units), path)
-    run("summary", copy / "results").exits(3, "mV/Pa (as scans/", "nA/Pa (as scans/")
+    run("summary", copy / "results").exits(3, "mV/Pa (as ../scans/", "nA/Pa (as ../scans/")
     path.write_bytes(b"PAR1")
     run("summary", copy / "results").exits(3, "is damaged", "--resume")
 

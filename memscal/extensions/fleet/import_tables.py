@@ -1,0 +1,100 @@
+"""Import of several tables, each by itself, to a folder of scans."""
+
+from collections.abc import Callable, Iterable, Mapping
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import click
+
+from memscal.cli import output as out
+from memscal.cli.failures import CHECK_FAILED, DONE
+from memscal.cli.import_ import convert, prepared
+from memscal.cli.options import Options
+from memscal.errors import InputError, MemscalError, OutputError
+from memscal.extensions.fleet.many import attempted
+from memscal.extensions.fleet.recipe import place_in_name, recipe_text
+from memscal.extensions.fleet.shards import TABLE_SUFFIXES, expanded, make_folder, manifest_scans
+from memscal.model.checks import Message, marked_texts
+from memscal.progress import Task
+from memscal.summaries.table import Table
+
+
+def import_tables(context: click.Context, options: Options) -> int:
+    """Convert tables to files in a folder, and print what was refused; return the exit code."""
+    asked = context.params
+    folder: Path = asked["output"]
+    recipe = asked["save_recipe"]
+    force = asked["force"]
+    targets = _targets(expanded(asked["tables"]), folder)
+    options = prepared(targets.values(), asked["kind"], options)
+    wanted = [path for path in targets if not (asked["resume"] and path.exists())]
+    jobs = {}
+    for path in wanted:
+        output = None if asked["dry_run"] else path
+        job = partial(convert, targets[path], output, asked["kind"], options, force=force)
+        jobs[str(targets[path])] = job
+    if not asked["dry_run"]:
+        there = [path for path in wanted if path.exists()]
+        out.prove_writable([*there, recipe], force=force, inputs=targets.values())
+        make_folder(folder)
+    counts = {"tables": len(targets), "kept": len(targets) - len(wanted)}
+    refused = attempt_all(jobs, counts, as_json=asked["as_json"])
+    if not asked["dry_run"]:
+        files = {recipe: recipe_text(context)} if recipe else {}
+        if options["name_pattern"]:
+            lines = ["path,sensor,wafer_x,wafer_y"]
+            for path, table in targets.items():
+                if str(table) not in refused:
+                    place = place_in_name(table, options).values()
+                    lines.append('"{}","{}",{},{}'.format(path.name, *place))
+            files[folder / "manifest.csv"] = "\n".join([*lines, ""])
+        out.write_files({path: text.encode() for path, text in files.items()}, force=True)
+        out.say_written([folder, *files])
+    return CHECK_FAILED if refused else DONE
+
+
+def _targets(sources: Iterable[Path], folder: Path) -> dict[Path, Path]:
+    """Return tables by the files to which they are written; refuse two for one."""
+    targets = dict[Path, Path]()
+    for source in sources:
+        tables = [source]
+        if source.is_dir():
+            tables = [source / scan.path for scan in manifest_scans([source], TABLE_SUFFIXES)]
+        for table in tables:
+            target = folder / f"{table.stem}.h5"
+            if target in targets:
+                raise InputError(
+                    f"{targets[target]} and {table} would both be written to {target}.",
+                    cure="Rename one of them, or import them to folders of their own.",
+                )
+            targets[target] = table
+    return targets
+
+
+def attempt_all(
+    jobs: Mapping[str, Callable[[], Any]], counts: Mapping[str, int], *, as_json: bool
+) -> dict[str, MemscalError]:
+    """Do jobs, by the names of their inputs; print what comes of them, and return what fails."""
+    notes: list[Message] = []
+    refused = {}
+    attempts = ((name, attempted(name, job)) for name, job in jobs.items())
+    with out.working("Reading"):
+        for name, done in Task("tables", len(jobs)).counted(attempts):
+            if isinstance(done, OutputError):
+                raise done
+            if isinstance(done, MemscalError):
+                refused[name] = done
+            else:
+                notes += done
+    numbers = {**counts, "read": len(jobs) - len(refused), "refused": len(refused)}
+    if as_json:
+        problems = [{"path": name, **vars(error)} for name, error in refused.items()]
+        stated = {"problems": problems, "notes": marked_texts(notes)}
+        out.emit_json({"schema_version": "1", **numbers, **stated})
+    else:
+        answer = ", ".join(f"{number} {name}" for name, number in numbers.items())
+        causes = [(name, error.problem, error.cure) for name, error in refused.items()]
+        out.emit_tables(Table("Refused", ("input", "problem", "cure"), causes), answer=answer)
+        out.show_messages(notes)
+    return refused

@@ -1,0 +1,116 @@
+"""The recipe, recipe.toml: what the options of ``memscal import`` can say, for many tables."""
+
+import json
+import re
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import click
+
+from memscal.cli.import_ import command, prepared
+from memscal.cli.options import Options, Quantity
+from memscal.errors import FormatError, InputError
+from memscal.formats.files import read_bytes
+
+SECTIONS = {
+    "table": "x x_unit y u u_unit u_errors noise u_xz u_yz u_sign ceiling repeat branch time "
+    "time_unit speed step holds depth depth_unit baseline baseline_curvature_uncertainty "
+    "line_offset_uncertainty title lab sheet scan skip_rows missing delimiter decimal",
+    "film": "young_modulus young_modulus_uncertainty poisson_ratio poisson_ratio_uncertainty "
+    "thickness thickness_uncertainty film_law mooney_rivlin_ratio base_slip_uncertainty",
+    "indenter": "indenter radius radius_uncertainty rod_friction lubrication lubricant",
+    "load": "load load_column load_unit load_uncertainty load_scatter",
+    "sensor": "sensor_name sensor_model channel name_pattern die_pitch gain_uncertainty "
+    "gain_curvature_uncertainty roundness_uncertainty shear_sensitivity_uncertainty",
+    "equipment": "load_cell load_cell_serial position_error position_errors_by_repeat "
+    "position_scale_uncertainty",
+}
+"""Keys of each section: options of ``memscal import``, with underscores."""
+
+_LONGEST = 1 << 20
+#: Fields of a pattern of names.
+_FIELDS = {
+    "row": r"(?P<row>-?\d+)",
+    "col": r"(?P<col>-?\d+)",
+    "sensor": "(?P<sensor>.+)",
+    "any": ".*",
+}
+
+
+def read_recipe(context: click.Context, path: Path) -> None:
+    """Take what a recipe states as defaults of a command's options, once each fits its option."""
+    try:
+        content = tomllib.loads(read_bytes(path, limit=_LONGEST).decode("utf-8"))
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
+        problem = f"{path.name} is no TOML: {error}."
+        raise FormatError(problem, cure="memscal import --save-recipe writes one.") from error
+    options = {option.name: option for option in context.command.params}
+    stated: Options = {}
+    for section, entries in content.items():
+        known = SECTIONS.get(section, "").split()
+        for key, value in entries.items() if isinstance(entries, dict) else [("", entries)]:
+            try:
+                if key not in known:
+                    raise click.BadParameter(f"Known are {', '.join(known or SECTIONS)}.")
+                stated[key] = _as_typed(options[key], value)
+                options[key].type_cast_value(context, stated[key])
+            except click.BadParameter as error:
+                raise FormatError(
+                    f"{path.name}: [{section}] {key} is {value!r}.",
+                    why=error.message,
+                    cure="A key is an option of memscal import, whose --help says what it states.",
+                ) from error
+    context.default_map = stated
+
+
+def _as_typed(option: Any, value: Any) -> Any:
+    """Return a value as it is given to an option."""
+    several = option.multiple or option.nargs > 1
+    items = value if isinstance(value, list) else [value]
+    if isinstance(value, bool) != option.is_flag or (items is value and not several):
+        raise click.BadParameter("A flag is true or false, another option text or a number.")
+    words = [str(item) for item in items]
+    return words if several else words[0]
+
+
+def recipe_text(context: click.Context) -> str:
+    """Return the recipe of a command's options, as they were given."""
+    words = {**(context.default_map or {}), **context.meta["memscal.words"]}
+    numbers = [item.name for item in context.command.params if isinstance(item.type, Quantity)]
+    lines = ["# Options of memscal import, in their units (memscal import --help)."]
+    for section, keys in SECTIONS.items():
+        lines += ["", f"[{section}]"]
+        for key in keys.split():
+            if key in words:
+                value = float(words[key]) if key in numbers else words[key]
+                lines.append(f"{key} = {json.dumps(value, ensure_ascii=False)}")
+    return "\n".join([*lines, ""])
+
+
+def recipe_of(path: Path) -> tuple[Options, Options]:
+    """Return what a recipe states, and the options with which it has tables read."""
+    context = command.make_context("import", ["table", "-o", "scan", "--recipe", str(path)])
+    words = {f"recipe {key}": value for key, value in (context.default_map or {}).items()}
+    return words, prepared((), "scan", context.params)
+
+
+def place_in_name(path: Path, options: Options) -> Options:
+    """Return sensor, wafer_x and wafer_y (mm) that the name of a file states; refuse another."""
+    expression = re.escape(options["name_pattern"])
+    for field, words in _FIELDS.items():
+        expression = expression.replace(rf"\{{{field}\}}", words)
+    found = re.fullmatch(expression, path.stem)
+    if found is None:
+        raise InputError(
+            f"{path.name} is not named as {options['name_pattern']}.",
+            why="{row} and {col} are whole numbers, {sensor} is a name, {any} is skipped.",
+            cure="Rename it, or give a --name-pattern that the names of all tables have.",
+        )
+    stated = found.groupdict("")
+    columns, rows = options["die_pitch"] or (1.0, 1.0)
+    return {
+        "sensor": stated.get("sensor", path.stem),
+        "wafer_x": float(stated.get("col", "nan")) * columns,
+        "wafer_y": float(stated.get("row", "nan")) * rows,
+    }
