@@ -3,8 +3,9 @@
 The command line exits with the ``exit_code`` of an error; a user catches :class:`MemscalError`.
 """
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterable, Iterator
 from contextlib import contextmanager
+from difflib import get_close_matches
 
 
 class MemscalError(Exception):
@@ -37,6 +38,10 @@ class MemscalError(Exception):
 
 class InputError(MemscalError, ValueError):
     """A value, an array or an option that cannot be worked with."""
+
+
+class ArgumentError(InputError, TypeError):
+    """An argument or an option of a name that is not known."""
 
 
 class DomainError(InputError):
@@ -91,3 +96,13 @@ def placed(where: str) -> Iterator[None]:
         if where in error.problem:
             raise
         raise type(error)(f"{where}: {error.problem}", why=error.why, cure=error.cure) from error
+
+
+def require_names(problem: str, given: Iterable[str], known: Collection[str]) -> None:
+    """Refuse names that are not known, in the words of the problem, and name the nearest one."""
+    unknown = sorted(name for name in given if name not in known)
+    if unknown:
+        near = get_close_matches(unknown[0], known, 1)
+        meant = f"Did you mean {near[0]}? " if near else ""
+        cure = f"{meant}Choose from {', '.join(known)}." if known else ""
+        raise ArgumentError(f"{problem} {', '.join(unknown)}.", cure=cure)

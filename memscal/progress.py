@@ -13,8 +13,11 @@ from contextvars import ContextVar
 from dataclasses import dataclass, field
 from functools import wraps
 from html import escape
+from inspect import signature
 from time import monotonic
 from typing import Any, Literal, TypeAlias, TypeVar, cast
+
+from memscal.errors import require_names
 
 _LOG = logging.getLogger("memscal")
 #: Seconds between two lines of the log about one task.
@@ -178,10 +181,15 @@ def done_with(step: str) -> None:
 
 
 def reported(function: _Function) -> _Function:
-    """Have the ``progress`` that a function is given told of all work within it."""
+    """Have the ``progress`` that a function is given told of all work within it.
+
+    An argument that the function does not have is refused, and the nearest one named.
+    """
+    known = signature(function).parameters
 
     @wraps(function)
     def with_progress(*args: Any, progress: Listener = None, **options: Any) -> Any:
+        require_names(f"{function.__name__}() has no argument", options, known)
         with reporting(progress):
             return function(*args, **options)
 

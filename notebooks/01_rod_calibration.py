@@ -322,7 +322,9 @@ def share_left(field):
 draws = np.array(
     [
         share_left(
-            memscal.divide(voltage, stress, weakest=weakest, method="white-noise-draw", seed=seed)
+            memscal.divide(
+                voltage, stress, weakest=weakest, method="white-noise-draw", options={"seed": seed}
+            )
         )
         for seed in range(20)
     ]

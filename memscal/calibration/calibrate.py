@@ -1,10 +1,10 @@
 """Calibration: from rod scans to an apparatus function with its covariance and checks."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import field, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from memscal.apparatus import ApparatusFunction
 from memscal.calibration.assemble import assemble
@@ -23,7 +23,7 @@ from memscal.calibration.film_inference import free_thickness, require_free, wei
 from memscal.calibration.prepare import Prepared, References, Request, prepare
 from memscal.calibration.stages import Deconvolution, Solution, solve
 from memscal.calibration.uncertainty import Correlations, Effects, Results, input_effects, propagate
-from memscal.deconvolution.division import Method, chosen_method
+from memscal.deconvolution.division import Method, MethodName, chosen_method
 from memscal.errors import FitError, MemscalError
 from memscal.estimation.profile import LEAST_DISTINCT
 from memscal.estimation.reference_spectra import expected_spectra, reference_spectra
@@ -34,7 +34,7 @@ from memscal.mechanics.contact import BaseStress, Contact
 from memscal.mechanics.press_rod import press_rod
 from memscal.model.arrays import array_record
 from memscal.model.assumptions import Assumption
-from memscal.model.film import LINEAR
+from memscal.model.film import LINEAR, FilmLaw
 from memscal.model.notation import VOLTS, Reading
 from memscal.model.result import Result
 from memscal.model.sizes import MOST_OF_LINES
@@ -128,22 +128,22 @@ def calibrate(
     *,
     reference: References = None,
     alternative: References = None,
-    film_law: str | None = None,
+    film_law: FilmLaw | None = None,
     mooney_rivlin_ratio: float | None = None,
     rod_friction: float | None = None,
-    channel: str = "zz",
-    method: str | Method = "white-noise",
-    centre: str | None = None,
+    channel: Literal["zz", "xz", "yz"] = "zz",
+    method: MethodName | Method = "white-noise",
+    options: Mapping[str, Any] | None = None,
+    centre: Literal["common", "per-repeat"] | None = None,
     correlations: Correlations | None = None,
     pixel_size: float | None = None,
-    free: str | Sequence[str] = (),
+    free: Literal["thickness"] | Sequence[Literal["thickness"]] = (),
     seed: int = 0,
     override: bool = False,
     accept_altered: bool = False,
     relative: bool = False,
     other: bool = True,
     progress: Listener = None,  # noqa: ARG001 - @reported
-    **options: Any,
 ) -> Calibration:
     r"""Find the apparatus function of a sensor from a rod scan, or from several.
 
@@ -178,11 +178,13 @@ def calibrate(
     channel : str, default "zz"
         ``"xz"`` or ``"yz"`` calibrates a tangential channel with the scan's ``u_xz`` or ``u_yz``,
         by method ``"bayesian"``; see docs/tangential.md.
-    method : str or Regulariser, default "white-noise"
+    method : str or Method, default "white-noise"
         Whose A and G the result has.  ``"white-noise"``, the paper's, divides the field of the
         smoothed voltages; ``tikhonov``, ``wiener`` and more are other
         divisions.  ``"bayesian"`` takes A and G from the scan's points: the smaller error, for
         friction.  ``.apparatus.other`` is the estimate by the other route.
+    options : mapping of str to value, optional
+        Parameters of a method that is given by its name, such as ``{"amplitude": 2.0}``.
     centre : str, optional
         ``"common"``: one centre for all repeats of a scan; ``"per-repeat"``: a centre, baseline and
         drift for each.  By default the latter only for lines whose repeats have no common centre,
@@ -208,8 +210,6 @@ def calibrate(
         Whether ``.apparatus.other``, the estimate by the other route, is calculated, too.
     progress : callable or True, optional
         Told of the steps that are done, and of parts of long ones: :class:`memscal.Progress`.
-    **options
-        Parameters of the method, such as ``amplitude``.
 
     Returns
     -------

@@ -14,13 +14,13 @@ import math
 from collections.abc import Collection, Mapping
 from functools import cached_property
 from numbers import Integral, Real
-from typing import TYPE_CHECKING, Any, ClassVar, Protocol
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, Protocol
 
 import numpy as np
 import scipy.fft
 
 from memscal.axisymmetry.grids import FieldGrid
-from memscal.errors import InputError
+from memscal.errors import InputError, require_names
 from memscal.estimation.bayesian import Bayesian
 from memscal.model.arrays import FloatArray, array_record, keyword_value_record
 
@@ -98,6 +98,11 @@ class Regulariser(Protocol):
     def divide(self, problem: DivisionProblem) -> Division:
         """Divide the voltage field by the stress field."""
 
+
+MethodName = Literal[
+    "white-noise", "bayesian", "white-noise-draw", "tikhonov", "wiener", "evidence"
+]
+"""Name of one of memscal's methods; ``evidence`` is a former name of ``bayesian``."""
 
 Method = Regulariser | Bayesian
 """A way from a scan to A and G: by a division, or by Bayesian model averaging."""
@@ -244,20 +249,18 @@ def create_regulariser(name: str, /, **options: Any) -> Method:
     accepted = inspect.signature(factory).parameters
     if "seed" not in accepted:
         options = {key: value for key, value in options.items() if key != "seed"}
-    unknown = sorted(set(options) - set(accepted))
-    if unknown and not any(p.kind is p.VAR_KEYWORD for p in accepted.values()):
-        raise InputError(
-            f"Method {name} has no option {', '.join(unknown)}.",
-            cure=f"Its options are: {', '.join(accepted) or 'none'}.",
-        )
+    if not any(p.kind is p.VAR_KEYWORD for p in accepted.values()):
+        require_names(f"Method {name} has no option", options, accepted)
     method: Method = factory(**options)
     return method
 
 
-def chosen_method(method: str | Method, options: Mapping[str, Any], **seed: int) -> Method:
+def chosen_method(
+    method: str | Method, options: Mapping[str, Any] | None = None, **seed: int
+) -> Method:
     """Set up a method by its name, or check one that is set up already."""
     if isinstance(method, str):
-        return create_regulariser(method, **seed, **options)
+        return create_regulariser(method, **seed, **(options or {}))
     divides = isinstance(method, Bayesian) or callable(getattr(method, "divide", None))
     if isinstance(method, type) or not divides:
         raise InputError(
@@ -275,18 +278,17 @@ def chosen_method(method: str | Method, options: Mapping[str, Any], **seed: int)
 def _factory(name: str) -> Any:
     if name in _OWN:
         return _OWN[name]
-    points = [point for point in _plug_ins() if point.name == name]
-    if not points:
-        cure = f"Choose from {', '.join(regulariser_names())}."
-        if name in _LEFT:
-            cure = f"{cure} docs/own_method.md adds {name} again, by scikit-image."
+    points = {point.name: point for point in _plug_ins()}
+    if name in _LEFT and name not in points:
+        cure = "docs/own_method.md adds it again, by scikit-image."
         raise InputError(f"There is no method named {name}.", cure=cure)
+    require_names("There is no method named", [name], regulariser_names())
     try:
-        return points[0].load()
+        return points[name].load()
     except Exception as error:
         # Whatever another package's import raises, the message names the package.
         raise InputError(
-            f"The method {name}, {points[0].value}, could not be loaded: {error}.",
+            f"The method {name}, {points[name].value}, could not be loaded: {error}.",
             cure="Repair or remove the package that provides it.",
         ) from error
 

@@ -10,6 +10,7 @@ r"""Fourier ratio, the paper's method on arrays: lift, divide, normalise, convol
 profiles from any source.
 """
 
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import cached_property, partial
 from typing import Any
@@ -18,7 +19,12 @@ import numpy as np
 
 from memscal.axisymmetry.grids import EvenGrid, FieldGrid, on_grid
 from memscal.axisymmetry.hankel import radial_spline, up_to
-from memscal.deconvolution.division import DivisionProblem, Regulariser, chosen_method
+from memscal.deconvolution.division import (
+    DivisionProblem,
+    MethodName,
+    Regulariser,
+    chosen_method,
+)
 from memscal.errors import FitError, InputError
 from memscal.estimation.bayesian import Bayesian
 from memscal.model.arrays import (
@@ -29,6 +35,7 @@ from memscal.model.arrays import (
     require_increasing,
     require_positive,
 )
+from memscal.progress import reported
 
 #: A field of more points along half its side takes gigabytes.
 _MOST_POINTS = 8192
@@ -178,13 +185,14 @@ def lift(r: FloatArray, profile: FloatArray, spacing: float, extent: float) -> F
     return Field(grid, on_grid(ending, grid, spacing / 2))
 
 
+@reported
 def divide(
     voltage: Field,
     stress: Field,
     *,
     weakest: float | tuple[float, float],
-    method: str | Regulariser = "white-noise",
-    **options: Any,
+    method: MethodName | Regulariser = "white-noise",
+    options: Mapping[str, Any] | None = None,
 ) -> Quotient:
     r"""Divide a voltage field by a stress field in Fourier space, with regularisation.
 
@@ -206,7 +214,7 @@ def divide(
         stress's transform first falls to the first, or at the last wavenumber.
     method : str or Regulariser, default "white-noise"
         One of the methods of :func:`memscal.calibrate` that divide fields.
-    **options
+    options : mapping of str to value, optional
         Parameters of the method, such as ``amplitude``.
 
     Returns

@@ -31,6 +31,7 @@ from memscal.friction.results import FrictionComparison, Joint, LoadComparison
 from memscal.measurement.measure_stress import joined_stress, measure_stress
 from memscal.measurement.posterior import common_inputs
 from memscal.measurement.restore import accept_other_sensor, load_of, single_loads
+from memscal.mechanics.indent import Loading
 from memscal.model.arrays import Values, require_non_negative
 from memscal.model.checks import Message, override_messages
 from memscal.model.indenter import Sphere
@@ -121,7 +122,7 @@ def compare(
     apparatus: ApparatusFunction | str | PathLike[str],
     *,
     friction: Sequence[float] | None = None,
-    loading: str | Sequence[str] = ("incremental", "total"),
+    loading: Loading | Sequence[Loading] = ("incremental", "total"),
     references: Sequence[StressProfile] | None = None,
     lubricated: str | None = None,
     lubricated_friction: float = LUBRICATED_FRICTION,

@@ -22,7 +22,7 @@ from memscal.axisymmetry.hankel import Wavenumbers
 from memscal.errors import ConvergenceError, DomainError, InputError
 from memscal.formats.cache import CacheFolder, find_contact_table, keep_contact_table, table_key
 from memscal.mechanics.contact import Contact
-from memscal.mechanics.indent import indent
+from memscal.mechanics.indent import Loading, indent
 from memscal.mechanics.interface import Interface
 from memscal.model.arrays import (
     Arrays,
@@ -177,7 +177,7 @@ class LoadingPath:
     indenter: Sphere
     loads: tuple[float, ...]
     friction: float = 0.0
-    loading: str = "incremental"
+    loading: Loading = "incremental"
     interface: Interface = field(default_factory=Interface)
     derivatives: bool = True
     order: int = 0  # one for the shear at the base

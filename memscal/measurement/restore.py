@@ -48,6 +48,7 @@ from memscal.model.records import FILM, SENSOR
 from memscal.model.scan import Scan
 from memscal.model.sizes import MOST_OF_CONTACT, too_large
 from memscal.parallel import single_threaded
+from memscal.progress import reported
 from memscal.readings.mistaken_unit import require_span
 
 #: What tells films apart; the modulus, too, by which a curved indenter's contact grows.
@@ -348,6 +349,7 @@ def noise_unstated_message(noise: str) -> Message:
     )
 
 
+@reported
 @single_threaded()
 def restore(
     scan: Scan | str | PathLike[str],

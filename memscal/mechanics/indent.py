@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from functools import partial
-from typing import TypedDict, Unpack, overload
+from typing import Literal, TypedDict, Unpack, overload
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from memscal.model.indenter import Indenter, Rod
 from memscal.parallel import single_threaded
 from memscal.progress import Listener, reported
 
+Loading = Literal["incremental", "total"]
 _Several = Sequence[float] | FloatArray
 
 # Fewer rings than this resolve no contact.
@@ -31,10 +32,10 @@ _SAME = 1e-6
 
 class _Options(TypedDict, total=False):
     friction: float
-    loading: str
-    backend: str
+    loading: Loading
+    backend: Literal["hankel", "fem"]
     interface: Interface | None
-    strain: str | None
+    strain: Literal["linear", "finite"] | None
     film_radius: float | None
     rings: int | None
     progress: Listener

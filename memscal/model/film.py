@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import replace
-from typing import Any
+from typing import Any, Literal
 
 from memscal.errors import InputError
 from memscal.model.arrays import (
@@ -18,6 +18,7 @@ _UNCUT = 1e-6
 #: In Pa: a softer film was given in MPa or kPa. Of one that is merely thick, which may stand for a
 #: half-space, a scan warns.
 _LEAST_MODULUS = 1e3
+FilmLaw = Literal["linear", "neo-hookean", "mooney-rivlin"]
 #: Laws of the film's stress: linear elasticity, and two of rubber at finite strain.
 LINEAR, NEO_HOOKEAN, MOONEY_RIVLIN = LAWS = ("linear", "neo-hookean", "mooney-rivlin")
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import field, fields, replace
 from functools import partial
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple, TypedDict, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -119,6 +119,61 @@ class SetUp(NamedTuple):
     def under(self, law: str) -> SetUp:
         """Return the same with a film of a law without further parameters."""
         return self._replace(film=replace(self.film, law=law, mooney_rivlin_ratio=None))
+
+
+class ArrayOptions(TypedDict, total=False):
+    """What :meth:`Scan.from_arrays` takes: arrays like ``u``, and fields of the records."""
+
+    y: ArrayLike
+    repeat: ArrayLike
+    branch: ArrayLike
+    u_errors: ArrayLike
+    load_column: ArrayLike
+    depth: ArrayLike
+    u_xz: ArrayLike
+    u_yz: ArrayLike
+    time: ArrayLike
+    x_unit: str
+    u_unit: str
+    load_unit: str
+    time_unit: str
+    speed: float
+    step: float
+    u_sign: int
+    holds: bool
+    depth_unit: str
+    baseline: Literal["before-each"]
+    ceiling: float
+    film: ElasticFilm
+    indenter: RoundIndenter
+    load: float
+    rod_friction: float
+    lubrication: str
+    lubricant: str
+    sensor: StressSensor
+    load_cell: LoadCell
+    stage: Equipment
+    user: User
+    direction: str
+    title: str
+    start_time: str
+    end_time: str
+    reference: StressProfile
+    synthetic: Mapping[str, float | str]
+    noise: float
+    load_uncertainty: float
+    load_scatter: float
+    x_error: float
+    position_errors_by_repeat: bool
+    position_scale_uncertainty: float
+    gain_uncertainty: float
+    gain_curvature_uncertainty: float
+    roundness_uncertainty: float
+    line_offset_uncertainty: float
+    base_slip_uncertainty: float
+    baseline_curvature_uncertainty: float
+    shear_sensitivity_uncertainty: float
+    u_zz_correlation: FloatArray
 
 
 @keyword_array_record
@@ -278,7 +333,7 @@ class Scan:
             object.__setattr__(self, "u_zz_correlation", correlation)
 
     @staticmethod
-    def from_arrays(x: ArrayLike, u: ArrayLike, **options: Any) -> Scan:
+    def from_arrays(x: ArrayLike, u: ArrayLike, **options: Unpack[ArrayOptions]) -> Scan:
         """Return a scan of arrays in any units, checked as :func:`memscal.import_table` checks.
 
         Parameters

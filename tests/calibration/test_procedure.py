@@ -136,12 +136,12 @@ def test_every_method_gives_a_near_the_truth_and_says_what_it_is(name):
 
 def test_a_method_may_be_an_object_and_options_reach_it():
     scan = simulated()
-    named = memscal.calibrate(scan, method="tikhonov", amplitude=2.0).apparatus
+    named = memscal.calibrate(scan, method="tikhonov", options={"amplitude": 2.0}).apparatus
     given = memscal.calibrate(scan, method=Tikhonov(amplitude=2.0)).apparatus
     assert_same_to_rounding(named.field.g, given.field.g)
     assert named.process.configuration["options"] == {"amplitude": 2.0}
     with pytest.raises(InputError, match="set up already"):
-        memscal.calibrate(scan, method=Tikhonov(), amplitude=2.0)
+        memscal.calibrate(scan, method=Tikhonov(), options={"amplitude": 2.0})
 
 
 def test_the_sweep_is_flat_about_the_rule_s_choice():
@@ -165,7 +165,7 @@ def test_the_sweep_is_flat_about_the_rule_s_choice():
         ({"reference": [None, None]}, "2 references were given, but there is one scan"),
         ({"method": 3}, "cannot divide"),
         ({"method": Tikhonov}, "that is set up"),
-        ({"amplitude": "abc"}, "must be a positive number"),
+        ({"options": {"amplitude": "abc"}}, "must be a positive number"),
         ({"method": "white-noise-draw", "seed": -1}, "whole number"),
     ],
 )

@@ -64,7 +64,9 @@ def test_the_weakest_component_of_the_voltage_is_read_where_that_of_the_stress_i
     voltage, stress = voltage_and_stress()
     pair = (1e-2, float(voltage.spectrum()[1][int(np.argmax(stress.spectrum()[1] <= 1e-2))]))
     drawn = [
-        memscal.divide(voltage, stress, weakest=weakest, method="white-noise-draw", seed=3)
+        memscal.divide(
+            voltage, stress, weakest=weakest, method="white-noise-draw", options={"seed": 3}
+        )
         for weakest in (1e-2, pair)
     ]
     np.testing.assert_allclose(drawn[0].values, drawn[1].values)
@@ -93,7 +95,7 @@ def test_fields_on_different_grids_are_not_divided():
     [
         ({"weakest": 0.0}, "weakest relevant component"),
         ({"weakest": float("nan")}, "weakest relevant component"),
-        ({"weakest": 1e-3, "method": Tikhonov(), "amplitude": 2.0}, "set up already"),
+        ({"weakest": 1e-3, "method": Tikhonov(), "options": {"amplitude": 2.0}}, "set up already"),
     ],
 )
 def test_a_division_without_a_noise_or_with_idle_options_is_refused(options, message):

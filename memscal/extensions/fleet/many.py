@@ -1,25 +1,48 @@
 """Calibration of many scans, in processes: a result or an error for each."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sized
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Sized
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import partial
-from inspect import signature
 from os import PathLike
-from typing import Any, TypeVar
+from typing import Any, Literal, TypedDict, TypeVar, Unpack
 
 from memscal.calibration.calibrate import calibrate
-from memscal.deconvolution.division import chosen_method
-from memscal.errors import InputError, MemscalError
+from memscal.calibration.prepare import References
+from memscal.calibration.uncertainty import Correlations
+from memscal.deconvolution.division import Method, MethodName, chosen_method
+from memscal.errors import InputError, MemscalError, require_names
 from memscal.formats.opened import Scans
 from memscal.model.apparatus import ApparatusRadial, ParameterSet
 from memscal.model.checks import Message, QualityCheck
+from memscal.model.film import FilmLaw
 from memscal.model.result import Correlated, Tabulated
 from memscal.model.scan import Scan
 from memscal.parallel import cores, shared
-from memscal.progress import Listener, Task, reported
+from memscal.progress import Listener, Task, reporting
 
 _Result = TypeVar("_Result")
+
+
+class CalibrationOptions(TypedDict, total=False):
+    """Options of :func:`memscal.calibrate` that many calibrations share."""
+
+    reference: References
+    alternative: References
+    film_law: FilmLaw | None
+    mooney_rivlin_ratio: float | None
+    rod_friction: float | None
+    channel: Literal["zz", "xz", "yz"]
+    method: MethodName | Method
+    options: Mapping[str, Any] | None
+    centre: Literal["common", "per-repeat"] | None
+    correlations: Correlations | None
+    pixel_size: float | None
+    free: Literal["thickness"] | Sequence[Literal["thickness"]]
+    seed: int
+    override: bool
+    accept_altered: bool
+    relative: bool
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -79,13 +102,12 @@ class FleetCalibration(Tabulated, Correlated):
         return self.error is None and all(check.passed for check in self.checks)
 
 
-@reported
 def calibrate_many(
     scans: Iterable[Scans],
     executor: Executor | None = None,
     *,
-    progress: Listener = None,  # noqa: ARG001 - @reported
-    **options: Any,
+    progress: Listener = None,
+    **options: Unpack[CalibrationOptions],
 ) -> Iterator[FleetCalibration]:
     """Calibrate with many scans, each by itself.
 
@@ -135,16 +157,16 @@ def calibrate_many(
             f"The executor is a {type(executor).__name__}, which takes no tasks.",
             cure="Give a concurrent.futures.Executor, or leave it out.",
         )
+    known = CalibrationOptions.__annotations__
+    require_names("calibrate_many() has no argument", options, known)
     method = options.get("method", "white-noise")
-    seed = options.get("seed", 0)
-    calibration = signature(calibrate).parameters
-    further = {name: value for name, value in options.items() if name not in calibration}
-    chosen_method(method, further, seed=seed)
+    chosen_method(method, options.get("options"), seed=options.get("seed", 0))
     task = partial(_calibrated, options=options)
     items = enumerate(scans)
     sized = list(items) if isinstance(scans, Sized) else items
-    results = shared(task, sized, workers=cores(), executor=executor)
-    return Task("scans", len(sized)).counted(results) if isinstance(sized, list) else results
+    with reporting(progress):
+        results = shared(task, sized, workers=cores(), executor=executor)
+        return Task("scans", len(sized)).counted(results) if isinstance(sized, list) else results
 
 
 def attempted(name: str, work: Callable[[], _Result]) -> _Result | MemscalError:
@@ -161,11 +183,12 @@ def attempted(name: str, work: Callable[[], _Result]) -> _Result | MemscalError:
         )
 
 
-def _calibrated(item: tuple[int, Scans], options: Mapping[str, Any]) -> FleetCalibration:
+def _calibrated(item: tuple[int, Scans], options: CalibrationOptions) -> FleetCalibration:
     """Calibrate one scan; an error is part of its result."""
     index, scan = item
-    options = {**options, "other": False}
-    apparatus = attempted(f"Scan {index}", lambda: calibrate(scan, **options).apparatus)
+    apparatus = attempted(
+        f"Scan {index}", lambda: calibrate(scan, other=False, **options).apparatus
+    )
     if isinstance(apparatus, MemscalError):
         return FleetCalibration(index=index, budget={}, error=apparatus)
     return FleetCalibration(

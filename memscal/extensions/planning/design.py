@@ -18,7 +18,7 @@ from memscal.axisymmetry.kernels import GaussianMixture, RadialKernel
 from memscal.calibration.calibrate import uncertainties
 from memscal.calibration.stages import Solution, solved
 from memscal.calibration.uncertainty import Results, input_effects
-from memscal.deconvolution.division import Method, Regulariser, chosen_method
+from memscal.deconvolution.division import Method, MethodName, chosen_method
 from memscal.errors import FitError, InputError
 from memscal.estimation.bayesian import supported, weigh_departures
 from memscal.estimation.departures import ReducedScan, departure_basis
@@ -46,7 +46,7 @@ from memscal.model.indenter import Rod
 from memscal.model.result import Result
 from memscal.model.scan import Scan
 from memscal.parallel import single_threaded
-from memscal.progress import Task, nobody, reporting
+from memscal.progress import Task, nobody, reported, reporting
 from memscal.readings.mistaken_unit import require_plausible
 
 Targets = Mapping[str, float]
@@ -264,7 +264,7 @@ class Design(Result, FrozenArrays):
 
 def evaluate(plan: Plan, method: str | Method = "bayesian", seed: int = 0) -> Design:
     """Return what to expect of a plan by a method; ``seed`` for one that draws random numbers."""
-    chosen = chosen_method(method, {}, seed=seed)
+    chosen = chosen_method(method, seed=seed)
     solution, results = expected_calibration(plan, chosen)
     deconvolution = solution.deconvolution
     k, transfer = solution.fields.grid.axis_transfer(deconvolution.quotient.values)
@@ -464,6 +464,7 @@ def _out_of_reach(what: str, targets: Targets, tried: list[Design]) -> FitError:
     )
 
 
+@reported
 @single_threaded()
 def design(
     *,
@@ -483,7 +484,7 @@ def design(
     position_scale_uncertainty: float | None = None,
     line_offset_uncertainty: float | None = None,
     roundness_uncertainty: float | None = None,
-    method: str | Regulariser = "bayesian",
+    method: MethodName | Method = "bayesian",
     seed: int = 0,
     want: Targets | None = None,
     vary: str | None = None,

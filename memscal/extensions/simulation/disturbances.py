@@ -1,21 +1,18 @@
 """What disturbs a simulated scan, in one record for rod scans and contacts alike."""
 
 import math
-import warnings
 
 import numpy as np
 
-from memscal.axisymmetry.kernels import GaussianMixture, RadialKernel
+from memscal.axisymmetry.kernels import RadialKernel
 from memscal.errors import InputError
 from memscal.model.arrays import (
     FloatArray,
-    Values,
     keyword_value_record,
     require_non_negative,
     require_positive,
     require_range,
 )
-from memscal.model.old_keywords import with_old_keywords
 
 # Beyond this scatter of the loads a parabola in ln P is no longer good to 1e-3.
 _MOST_SCATTER = 0.1
@@ -116,18 +113,3 @@ TYPICAL = Disturbances()
 
 Shear = tuple[RadialKernel, float] | None
 """Apparatus function and conversion constant (V/Pa) of the tangential channel along x."""
-
-
-def with_old_arguments(
-    function: str, old: Values, disturbances: Disturbances, shear: Shear
-) -> tuple[Disturbances, Shear]:
-    """Put the keywords of an earlier version where they are now."""
-    channels = old.pop("channels", ("zz",))
-    kernel = old.pop("shear_kernel", None) or GaussianMixture()
-    constant = old.pop("shear_conversion_constant", 5e-8)
-    if "xz" in channels:
-        message = f"{function}(channels=...) becomes {function}(shear=(kernel, constant))."
-        warnings.warn(message, DeprecationWarning, stacklevel=4)
-        shear = (kernel, constant)
-    [disturbances] = with_old_keywords(function, old, stacklevel=5, disturbances=disturbances)
-    return disturbances, shear

@@ -18,9 +18,9 @@ from memscal.extensions.simulation.disturbances import (
     TYPICAL,
     Disturbances,
     Shear,
-    with_old_arguments,
 )
 from memscal.extensions.simulation.rod_scan import PAPER_FILM, PAPER_ROD, simulate, without_law
+from memscal.mechanics.indent import Loading
 from memscal.mechanics.interface import Interface
 from memscal.model.arrays import Values, array_record, keyword_value_record, require_non_negative
 from memscal.model.film import ElasticFilm
@@ -28,6 +28,7 @@ from memscal.model.indenter import Rod, Sphere
 from memscal.model.instrument import LoadCell
 from memscal.model.scan import Scan
 from memscal.parallel import single_threaded
+from memscal.progress import reported
 
 
 @keyword_value_record
@@ -95,6 +96,7 @@ class Experiment:
         return {"rod_scan": self.rod, "sphere_dry": self.dry, "sphere_lubricated": self.lubricated}
 
 
+@reported
 @single_threaded()
 def simulate_experiment(
     *,
@@ -111,14 +113,13 @@ def simulate_experiment(
     loads: Sequence[float] = PAPER_LOADS,
     lubricated_loads: Sequence[float] = (0.69, 2.75),
     friction: float = 0.2,
-    loading: str = "incremental",
+    loading: Loading = "incremental",
     interface: Interface | None = None,
     points: int = 33,
     spacing: float = 0.5e-3,
     repeats: int = 1,
     disturbances: Disturbances = TYPICAL,
     seed: int = 0,
-    **old: Any,
 ) -> Experiment:
     r"""Simulate an experiment: a rod scan, and contacts of a sphere, dry and lubricated.
 
@@ -152,9 +153,6 @@ def simulate_experiment(
         and what the scans state.
     seed : int
         What is drawn and each scan have streams of random numbers of their own.
-    **old
-        Fields of ``disturbances``, and ``channels``, ``shear_kernel``,
-        ``shear_conversion_constant``: arguments of an earlier version, for one version more.
 
     Returns
     -------
@@ -174,7 +172,6 @@ def simulate_experiment(
     >>> experiment.dry.synthetic["friction"], experiment.lubricated.synthetic["friction"]
     (0.1, 0.0)
     """
-    disturbances, shear = with_old_arguments("simulate_experiment", old, disturbances, shear)
     require_non_negative("seed", seed)
     # The order of the streams of random numbers is a promise: a new one goes to the end.
     inputs_seed, rod_seed, dry_seed, lubricated_seed = (

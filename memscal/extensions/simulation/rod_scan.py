@@ -3,7 +3,6 @@
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -13,7 +12,6 @@ from memscal.extensions.simulation.disturbances import (
     TYPICAL,
     Disturbances,
     Shear,
-    with_old_arguments,
 )
 from memscal.extensions.simulation.sensor import (
     blurred_stress,
@@ -27,6 +25,7 @@ from memscal.model.film import LINEAR, NEO_HOOKEAN, ElasticFilm
 from memscal.model.indenter import Rod
 from memscal.model.scan import Scan
 from memscal.parallel import single_threaded
+from memscal.progress import reported
 
 #: The paper's film, with its uncertainties where it gives them and modest ones elsewhere.
 PAPER_FILM = ElasticFilm(
@@ -43,6 +42,7 @@ PAPER_FILM = ElasticFilm(
 PAPER_ROD = Rod(radius=0.25e-3, radius_uncertainty=2.5e-6)
 
 
+@reported
 @single_threaded()
 def simulate(
     *,
@@ -59,7 +59,6 @@ def simulate(
     raster: bool = False,
     disturbances: Disturbances = TYPICAL,
     seed: int = 0,
-    **old: Any,
 ) -> Scan:
     """Simulate a rod scan through a known apparatus function.
 
@@ -95,9 +94,6 @@ def simulate(
         largest signal that the scan meets, at the (mean) load.
     seed : int
         Seed of the noise.
-    **old
-        Fields of ``disturbances``, and ``channels``, ``shear_kernel``,
-        ``shear_conversion_constant``: arguments of an earlier version, for one version more.
 
     Returns
     -------
@@ -115,7 +111,6 @@ def simulate(
     >>> scan.u_zz.shape, scan.synthetic["gaussian_sigma"]
     ((33,), 0.000561)
     """
-    disturbances, shear = with_old_arguments("simulate", old, disturbances, shear)
     require_range("half_range", half_range, 1e-9, 1.0, "m")
     require_non_negative("seed", seed)
     if points < 2 or repeats < 1:

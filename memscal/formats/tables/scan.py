@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from memscal.errors import InputError
+from memscal.errors import InputError, require_names
 from memscal.extensions import hook
 from memscal.formats.tables.columns import NamedColumns, Wanted
 from memscal.formats.tables.positions import (
@@ -25,10 +25,9 @@ from memscal.model.checks import Message, at_ceiling_text, import_notes, marked_
 from memscal.model.holds import Holds
 from memscal.model.indenter import Rod, RoundIndenter
 from memscal.model.notation import Reading, format_measured
-from memscal.model.old_keywords import with_old_keywords
 from memscal.model.quantities import dimension_in
 from memscal.model.records import FILM, LOAD, ROUND_INDENTER, TAKEN_FOR_GRANTED
-from memscal.model.scan import BRANCHES, Scan, branch_numbers, load_groups
+from memscal.model.scan import BRANCHES, ArrayOptions, Scan, branch_numbers, load_groups
 from memscal.progress import Listener, reported
 from memscal.readings.ceiling import without_clipped
 from memscal.readings.dead_rows import without_dead_rows
@@ -97,7 +96,6 @@ def import_table(
     conditions: ScanConditions | None = None,
     uncertainties: ScanUncertainties | None = None,
     progress: Listener = None,  # noqa: ARG001 - @reported
-    **old: Any,
 ) -> ImportedScan:
     """Read a scan from a table with one row for each reading.
 
@@ -135,9 +133,6 @@ def import_table(
         Standard uncertainties of readings, loads and positions.
     progress : callable or True, optional
         Told how many rows are read: :class:`memscal.Progress`.
-    **old
-        Fields of the three records (``load=1.0``), which were arguments of their own before: they
-        work for one version more, with a DeprecationWarning.
 
     Returns
     -------
@@ -167,14 +162,9 @@ def import_table(
     >>> scan
     <ImportedScan: line, 5 points, x from -8 to 8 mm, load 1 N>
     """
-    layout, conditions, uncertainties = with_old_keywords(
-        "import_table",
-        old,
-        stacklevel=4,
-        layout=layout or TableLayout(),
-        conditions=conditions or ScanConditions(),
-        uncertainties=uncertainties or ScanUncertainties(),
-    )
+    layout = layout or TableLayout()
+    conditions = conditions or ScanConditions()
+    uncertainties = uncertainties or ScanUncertainties()
     named = {
         "u_zz": u,
         "u_xz": u_xz,
@@ -230,6 +220,7 @@ def import_table(
 
 def scan_of_arrays(x: ArrayLike, u: ArrayLike, **options: Any) -> ImportedScan:
     """Return a scan of arrays like ``u``, of which some options are; a row of ``u`` is a pass."""
+    require_names("Scan.from_arrays() has no argument", options, ArrayOptions.__annotations__)
     readings = frozen_array(u)
     given = {name: options.pop(name) for name in ARRAYS if options.get(name) is not None}
     if readings.ndim == 2 and not given.keys() & {"y", "repeat"}:

@@ -61,13 +61,3 @@ def test_a_whole_experiment_has_the_channel_in_all_of_its_scans():
 def test_a_channel_without_an_apparatus_function_or_a_constant_is_refused(shear, problem):
     with pytest.raises(InputError, match=problem):
         memscal.simulate(shear=shear)
-
-
-def test_the_arguments_of_an_earlier_version_make_the_same_scan_with_a_warning():
-    old = {"channels": ("zz", "xz"), "shear_kernel": KERNEL, "noise": 0.01, "drift": 0.1}
-    with pytest.warns(DeprecationWarning, match="becomes") as warned:
-        found = memscal.simulate(**old, seed=2)
-    assert {warning.filename for warning in warned} == {__file__}
-    expected = simulate(shear=(KERNEL, 5e-8), noise=0.01, drift=0.1, seed=2)
-    np.testing.assert_array_equal(found.channels["u_xz"], expected.channels["u_xz"])
-    np.testing.assert_array_equal(found.u_zz, expected.u_zz)
