@@ -68,7 +68,7 @@ ONLY_IN = {
     "pyarrow": {"formats", "extensions"},
     "skfem": {"mechanics", "extensions"},
     "skimage": {"deconvolution"},
-    "weasyprint": {"extensions"},
+    "typst": {"extensions"},
 }
 
 SLOW = {
@@ -85,7 +85,7 @@ SLOW = {
     "scipy.stats",
     "skfem",
     "skimage",
-    "weasyprint",
+    "typst",
 }
 
 ONE_ROLE = {"cli", "extensions", "figures", "formats", "summaries"}

@@ -85,14 +85,14 @@ def format_measured(value: float, uncertainty: float | None, unit: str = "") -> 
         return f"{value:.4g}{tail} (no uncertainty stated)"
     if uncertainty <= _NEGLIGIBLE * abs(value):
         return f"{value:.6g}{tail} (no uncertainty stated)"
-    number, spread, exponent = _rounded(value, uncertainty)
+    number, spread, exponent = rounded(value, uncertainty)
     factor = "" if exponent == 0 else "×10" + str(exponent).translate(SUPERSCRIPTS)
     if factor or tail:
         return f"({number} ± {spread}){factor}{tail}"
     return f"{number} ± {spread}"
 
 
-def _rounded(value: float, uncertainty: float) -> tuple[str, str, int]:
+def rounded(value: float, uncertainty: float) -> tuple[str, str, int]:
     """Return value and uncertainty as digits, and the power of ten that they share."""
     # Decimal arithmetic, because a binary 0.0145 would round differently from what is read.
     with localcontext() as context:

@@ -1,12 +1,15 @@
 """Contents of a certificate of calibration, once for all its forms."""
 
-from collections.abc import Iterable, Mapping
+import math
+import re
+import tomllib
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from datetime import date
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.special import ndtr
+from scipy.special import stdtr
 
 from memscal.apparatus import ApparatusFunction
 from memscal.axisymmetry.hankel import radial_spline
@@ -14,6 +17,8 @@ from memscal.errors import InputError
 from memscal.extensions.certificate.laboratory import (
     KINDS,
     RULES,
+    SECTIONS,
+    TEXTS,
     LaboratoryFile,
     Measured,
     Section,
@@ -23,7 +28,7 @@ from memscal.formats.artifact import artifact_tree
 from memscal.formats.hdf5.writer import tree_to_bytes
 from memscal.formats.units import to_si
 from memscal.model.arrays import FloatArray, Values, keyword_value_record, value_record
-from memscal.model.checks import OVERRIDE
+from memscal.model.assumptions import ASSUMED
 from memscal.model.provenance import timestamp
 from memscal.model.quantities import MM, Quantity, parameter_quantity
 
@@ -34,7 +39,6 @@ COVERAGE_PROBABILITY = 0.95
 #: Parameters of the sensor; the others are those of one scan.
 _SENSOR_PARAMETERS = (
     "conversion_constant",
-    "conversion_constant_gaussian",
     "gaussian_sigma",
     "gaussian_sigma_deconvolved",
     "fwhm",
@@ -42,7 +46,13 @@ _SENSOR_PARAMETERS = (
     "ellipticity",
     "ellipticity_diagonal",
 )
-SYNTHETIC = "SYNTHETIC DATA: NOTHING WAS MEASURED"
+#: Bounds of the budget, anywhere within which the truth may lie: rectangles.
+_BOUNDS = ("model_form", "rod_friction")
+#: Places spread evenly over a rectangle of half a width of one.
+_WITHIN = (np.arange(1000) + 0.5) / 500 - 1
+#: A length or an area whose expanded uncertainty is a larger share of it is not determined.
+_DETERMINED = 0.5
+_OTHER = "conversion_constant_gaussian"
 _SHOWN_SHARE = 0.01
 _MOST_RADII = 12
 #: A value that conforms with less probability rather does not.
@@ -53,17 +63,43 @@ _MOST_EMBEDDED = 4_000_000
 
 @value_record
 class CertifiedValue:
-    """A parameter with its standard uncertainty, in SI units, and how it is shown."""
+    """A parameter with its standard uncertainty, in SI units, and how its errors are spread."""
 
     quantity: Quantity
     value: float
     uncertainty: float
     factor: float = COVERAGE_FACTOR  # k: larger where an estimated noise has few degrees of freedom
+    degrees: float = math.inf  # effective ones of the uncertainty
+    bounds: tuple[float, ...] = ()  # standard uncertainties of the rectangles in it
 
     @property
     def expanded(self) -> float:
         """The expanded uncertainty U = k u."""
         return self.factor * self.uncertainty
+
+    @property
+    def determined(self) -> bool:
+        """Whether the scan tells the value: of a number without a unit zero is a value, too."""
+        largest = _DETERMINED * abs(self.value) if self.quantity.unit else math.inf
+        return self.expanded <= largest
+
+    def probability(self, lower: float, upper: float) -> float:
+        r"""Probability that the true value lies between limits, in SI units.
+
+        By the budget: errors :math:`\sqrt{u^2 - \sum u_i^2}\,t_\nu` of Student's distribution,
+        beside those of each rectangle, of half a width of :math:`\sqrt{3} u_i`.
+        """
+        errors = np.zeros(1)
+        bounded = 0.0
+        for u in self.bounds:
+            errors = np.add.outer(errors, 3**0.5 * u * _WITHIN).ravel()
+            bounded += u**2
+        rest = max(self.uncertainty**2 - bounded, 1e-12 * bounded, np.finfo(float).tiny)
+        # By Welch and Satterthwaite degrees grow with the fourth power of what else there is.
+        degrees = max(self.degrees * (rest / (rest + bounded)) ** 2, 1.0)
+        ends = [(end - self.value - errors) / rest**0.5 for end in (lower, upper)]
+        low, high = stdtr(degrees, ends)
+        return float(np.mean(high - low))
 
 
 @value_record
@@ -84,22 +120,15 @@ class Conformity:
 
     @property
     def statement(self) -> str:
-        """The statement of conformity in words."""
+        """Name of the statement of conformity among the texts."""
         if not self.accepted:
-            return "not stated to conform"
-        rather_not = ", though more probably it does not: the tolerance is too narrow to tell"
-        return f"conforms{rather_not if self.probability < _EVEN else ''}"
+            return "not_stated"
+        return "conforms" if self.probability >= _EVEN else "conforms_rather_not"
 
     @property
     def probability(self) -> float:
-        r"""Conformance probability of a normal distribution (JCGM 106:2012, 7.3).
-
-        :math:`p_c = \Phi((T_U - y)/u) - \Phi((T_L - y)/u)`.
-        """
-        low = self.lower - self.certified.value
-        high = self.upper - self.certified.value
-        u = self.certified.uncertainty
-        return ndtr(high / u) - ndtr(low / u) if u > 0 else float(low <= 0 <= high)
+        """Conformance probability (JCGM 106:2012, 7.3)."""
+        return self.certified.probability(self.lower, self.upper)
 
 
 class CertifiedProfile(NamedTuple):
@@ -108,6 +137,13 @@ class CertifiedProfile(NamedTuple):
     r: FloatArray
     g: FloatArray
     covariance: FloatArray
+
+
+class Missing(NamedTuple):
+    """What a certificate lacks, in its own words, and where a user states or reads of it."""
+
+    words: str
+    cure: str
 
 
 @keyword_value_record
@@ -119,91 +155,127 @@ class Certificate:
     sections: Mapping[str, Section]  # of the laboratory's file, with the artifact's
     equipment: tuple[Section, ...]
     apparatus: ApparatusFunction
+    texts: Mapping[str, Any]  # of its language
     values: tuple[CertifiedValue, ...]
-    covariance: FloatArray  # of the values, in SI units
+    others: tuple[CertifiedValue, ...]  # another estimate, which the annex states
+    undetermined: tuple[CertifiedValue, ...]
     profile: CertifiedProfile
     conformity: tuple[Conformity, ...]
+    missing: tuple[Missing, ...]
     artifact: bytes  # the artifact in its compact form; empty if that is too large
+
+    def covariance_of(self, values: Iterable[CertifiedValue]) -> FloatArray:
+        """Joint covariance of some values, in SI units."""
+        names = [value.quantity.name for value in values]
+        return self.apparatus.parameters.only(names).covariance
 
     @property
     def correlation(self) -> FloatArray:
         """Correlation coefficients of the values."""
-        u = np.sqrt(np.diag(self.covariance))
+        covariance = self.covariance_of(self.values)
+        u = np.sqrt(np.diag(covariance))
         scale = np.multiply.outer(u, u)
-        return np.divide(self.covariance, scale, out=np.eye(u.size), where=scale > 0)
+        return np.divide(covariance, scale, out=np.eye(u.size), where=scale > 0)
 
     @property
     def synthetic(self) -> bool:
         """Whether the scan was simulated."""
         return any(message.kind == "synthetic" for message in self.apparatus.process.messages)
 
-    @property
-    def warnings(self) -> list[str]:
-        """What must be said first: synthetic data, checks that failed, what was overridden."""
-        warnings = []
-        if self.synthetic:
-            form = "This shows the form of a certificate and certifies nothing."
-            warnings.append(f"{SYNTHETIC}. {form}")
-        failed = [c.name.replace("_", " ") for c in self.apparatus.checks if not c.passed]
-        if failed:
-            warnings.append(f"Quality checks of the calibration that failed: {', '.join(failed)}.")
-        messages = self.apparatus.process.messages
-        return warnings + [m.text for m in messages if m.kind == OVERRIDE]
-
-    @property
-    def accreditation(self) -> str:
-        """What the laboratory states of its accreditation, in a sentence."""
-        stated = self.sections["laboratory"].get("accreditation")
-        none = "This is no accredited certificate: the laboratory states no accreditation for it."
-        return f"Accreditation, as the laboratory states it: {stated}." if stated else none
-
-    @property
-    def decision(self) -> str:
-        """The decision rule in words."""
-        stated = self.sections.get("decision", {})
-        if stated.get("rule") == RULES[0]:
-            return "Simple acceptance (JCGM 106:2012, 8.2): the value lies within its tolerance."
-        rule = "Guarded acceptance (JCGM 106:2012, 8.3.2): the value lies within its tolerance"
-        band = f"the guard band w = {stated.get('guard_band', 1.0):g} U"
-        return f"{rule}, and clear of its limits by {band}."
+    def words(self, group: str, name: str) -> str:
+        """What the texts call something of a group."""
+        return str(self.texts[group].get(name, name.replace("_", " ")))
 
 
-def certify(apparatus: ApparatusFunction, laboratory: LaboratoryFile) -> Certificate:
-    """Return the contents of a certificate; what is mandatory and missing is all named."""
+def certify(
+    apparatus: ApparatusFunction, laboratory: LaboratoryFile, *, incomplete: bool = False
+) -> Certificate:
+    """Return the contents of a certificate; all that it lacks is named, and refused or said."""
     apparatus.require_pascals()
     sections, equipment = _completed(apparatus, laboratory)
-    missing = [*missing_keys(sections, equipment)]
-    if missing:
-        raise InputError(
-            f"The certificate lacks {len(missing)} mandatory fields: {'; '.join(missing)}.",
-            why="A certificate states who calibrated what for whom, with what and when (ISO/IEC "
-            "17025:2017, 7.8.2 and 7.8.4).",
-            cure=f"State them in {laboratory.name}, or in the scan (memscal import --lab).",
-        )
+    texts = _texts(sections["certificate"].get("language", "en"))
+    values = {}
     parameters = apparatus.parameters
-    parameters = parameters.only([name for name in _SENSOR_PARAMETERS if name in parameters])
-    values = []
-    for name in parameters.names:
-        quantity = parameter_quantity(parameters, name)
-        u = parameters.uncertainty(name)
-        values.append(
-            CertifiedValue(quantity, parameters[name], u, apparatus.coverage_factor(name))
+    for name in (*_SENSOR_PARAMETERS, _OTHER):
+        if name in parameters:
+            values[name] = _certified(apparatus, name)
+    missing = []
+    for key in missing_keys(sections, equipment):
+        words = re.sub(r"[\W_]+", " ", key).strip()
+        missing.append(Missing(words, f"{key} in {laboratory.name}"))
+    missing += _unstated(apparatus, texts["missing"], values)
+    if missing and not incomplete:
+        listed = "; ".join(f"{item.words} ({item.cure})" for item in missing)
+        raise InputError(
+            f"The certificate lacks: {listed}.",
+            why="A certificate states who calibrated what for whom, with what and when, and every "
+            "uncertainty that counts (ISO/IEC 17025:2017, 7.8.2 and 7.8.4).",
+            cure="State them, in the scan by memscal import and calibrate it again, or write a "
+            "certificate that says what it lacks (--incomplete).",
         )
+    other = values.pop(_OTHER, None)
+    certified = [value for value in values.values() if value.determined]
     artifact = tree_to_bytes(artifact_tree(apparatus.compact()))
     derived = apparatus.content_digest[:_NUMBER_DIGITS].upper()
     stated = sections["laboratory"]
+    decided = _conformity(certified, sections["decision"], laboratory.name)
     return Certificate(
         number=stated.get("number") or stated.get("prefix", "") + derived,
         issued=timestamp()[:10],
         sections=sections,
         equipment=equipment,
         apparatus=apparatus,
-        values=tuple(values),
-        covariance=parameters.covariance,
+        texts=texts,
+        values=tuple(certified),
+        others=(other,) if other else (),
+        undetermined=tuple(value for value in values.values() if not value.determined),
         profile=_profile(apparatus),
-        conformity=tuple(_conformity(values, sections.get("decision", {}), laboratory.name)),
+        conformity=() if missing else tuple(decided),
+        missing=tuple(missing),
         artifact=artifact if len(artifact) <= _MOST_EMBEDDED else b"",
     )
+
+
+def _texts(language: str) -> Values:
+    return tomllib.loads((TEXTS / f"{language}.toml").read_text(encoding="utf-8"))
+
+
+def _certified(apparatus: ApparatusFunction, name: str) -> CertifiedValue:
+    parameters = apparatus.parameters
+    budget = apparatus.budget.get(name, {})
+    return CertifiedValue(
+        parameter_quantity(parameters, name),
+        parameters[name],
+        parameters.uncertainty(name),
+        apparatus.coverage_factor(name),
+        apparatus.effective_degrees.get(name, math.inf),
+        tuple(budget[source] for source in _BOUNDS if budget.get(source)),
+    )
+
+
+def _unstated(
+    apparatus: ApparatusFunction, words: Mapping[str, str], values: Mapping[str, CertifiedValue]
+) -> Iterator[Missing]:
+    """Yield what the calibration lacks: uncertainties of what enters, and checks that passed."""
+    states = {each.name: each.state for each in apparatus.assumptions}
+    film = apparatus.film
+    rod = apparatus.indenter
+    unstated = {
+        "gain": "gain" not in apparatus.budget.get("conversion_constant", {}),
+        # Of an artifact without assumptions nothing is known to be stated.
+        "position_scale": states.get("stage_scale", ASSUMED) == ASSUMED,
+        "load": states.get("load_scale") == ASSUMED,
+        "thickness": film is not None and film.thickness_uncertainty is None,
+        "radius": rod is not None and rod.radius_uncertainty is None,
+    }
+    for name in [name for name, lacking in unstated.items() if lacking]:
+        yield Missing(words[name], f"memscal import --{name.replace('_', '-')}-uncertainty")
+    for check in apparatus.checks:
+        if not check.passed:
+            name = check.name.replace("_", " ")
+            yield Missing(f"{words['check']} {name}", f"memscal explain {check.name}")
+    if not values["conversion_constant"].determined:
+        yield Missing(words["conversion_constant"], "measure with less noise")
 
 
 def _completed(
@@ -211,9 +283,9 @@ def _completed(
 ) -> tuple[dict[str, Values], tuple[Values, ...]]:
     """Return sections and equipment of the laboratory's file, with what the artifact states."""
     held = laboratory.additions(apparatus)
-    sections = {name: dict(section) for name, section in laboratory.sections.items()}
+    sections = {name: dict(laboratory.sections.get(name, {})) for name in SECTIONS}
     sensor = held["sensor"]
-    conditions = sections.setdefault("conditions", {})
+    conditions = sections["conditions"]
     names = ("name", "model", "manufacturer", "channel")
     sections["sensor"] = {name: getattr(sensor, name) for name in names}
     sections["sensor"]["serial"] = sensor.serial_number
@@ -227,7 +299,7 @@ def _completed(
         stated = Measured(sensor.temperature, sensor.temperature_uncertainty)
         conditions["temperature"] = stated
     if held["user"].name:
-        sections.setdefault("person", {})["operator"] = held["user"].name
+        sections["person"]["operator"] = held["user"].name
     listed = []
     for kind, attribute in KINDS.items():
         part = held[attribute]

@@ -31,11 +31,19 @@ _FORM = out.FigurePath((".html", ".pdf", ".xml"))
     "Certificate to write: a page, a tagged PDF/A-3 that holds the XML, or a Digital Calibration "
     "Certificate (DCC). May be repeated."
 )
+@option("--incomplete", is_flag=True)(
+    "Write a certificate that says what it lacks, and states no conformity."
+)
 @output_options
 def command(
-    artifact: Path, laboratory: Path, outputs: tuple[Path, ...], as_json: bool, force: bool
+    artifact: Path,
+    laboratory: Path,
+    outputs: tuple[Path, ...],
+    incomplete: bool,
+    as_json: bool,
+    force: bool,
 ) -> int:
-    """Write a certificate of calibration, if nothing that is mandatory is missing.
+    """Write a certificate of calibration, if it lacks nothing; what it lacks is all named.
 
     Values with expanded uncertainties (k = 2), correlations, G(r) and budget; and, if the
     laboratory's file gives tolerances, a statement of conformity by its decision rule. It is no
@@ -47,19 +55,22 @@ def command(
     from memscal.extensions.certificate.dcc import certificate_xml
     from memscal.extensions.certificate.laboratory import read_laboratory
 
-    certificate = certify(load_apparatus(artifact), read_laboratory(laboratory))
+    held = load_apparatus(artifact)
+    certificate = certify(held, read_laboratory(laboratory), incomplete=incomplete)
     forms = {path.suffix.lower() for path in outputs}
     made = {".xml": certificate_xml(certificate)} if forms - {".html"} else {}
     if forms - {".xml"}:
-        from memscal.extensions.certificate.page import certificate_page, certificate_pdf
+        from memscal.extensions.certificate.page import certificate_page, certificate_pdf, page_of
 
         with out.working("Drawing"):
-            page = certificate_page(certificate)
-            made[".html"] = page.encode("utf-8")
+            page = page_of(certificate)
+            if ".html" in forms:
+                made[".html"] = certificate_page(page).encode("utf-8")
             if ".pdf" in forms:
-                made[".pdf"] = certificate_pdf(certificate, page, made[".xml"])
+                made[".pdf"] = certificate_pdf(page, made[".xml"])
     out.write_files({path: made[path.suffix.lower()] for path in outputs}, force=force)
     result = {"number": certificate.number, "issued": certificate.issued}
+    lacking = [f"{item.words} ({item.cure})" for item in certificate.missing]
     if as_json:
         decided = [
             {
@@ -70,11 +81,15 @@ def command(
             for item in certificate.conformity
         ]
         written = {"schema_version": "1", "outputs": [str(path) for path in outputs]}
-        out.emit_json({**written, **result, "conformity": decided})
+        out.emit_json({**written, **result, "conformity": decided, "missing": lacking})
     else:
         rows = list(result.items())
-        rows += [(item.certified.quantity.words, item.statement) for item in certificate.conformity]
+        for item in certificate.conformity:
+            words = certificate.words("statements", item.statement)
+            rows.append((item.certified.quantity.words, words))
         out.emit_tables(Table("Certificate", ("", ""), rows))
+    if lacking:
+        out.warn(f"The certificate is incomplete: it lacks {'; '.join(lacking)}.")
     if certificate.synthetic:
         out.note("The data are synthetic: the certificate says so on every page.")
     out.message(f"Written: {', '.join(map(str, outputs))}")

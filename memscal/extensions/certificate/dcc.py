@@ -4,7 +4,6 @@ import base64
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from string import Template
 from typing import Any
 from xml.etree import ElementTree as ET
 
@@ -15,8 +14,9 @@ from memscal.extensions.certificate.certificate import (
     COVERAGE_FACTOR,
     COVERAGE_PROBABILITY,
     Certificate,
+    CertifiedValue,
 )
-from memscal.extensions.certificate.laboratory import SECTIONS, ZERO_CELSIUS
+from memscal.extensions.certificate.content import assumption_rows, fields_of, filled
 from memscal.formats.units import dsi_unit
 from memscal.model.arrays import FloatArray, Values
 from memscal.model.quantities import DIMENSIONS, PER_MM
@@ -33,56 +33,39 @@ def certificate_xml(certificate: Certificate) -> bytes:
     for prefix, space in {**_SPACES, "xsi": "http://www.w3.org/2001/XMLSchema-instance"}.items():
         ET.register_namespace(prefix, space)
     root = ET.fromstring(_CONSTANT.read_bytes())
-    texts = _texts(certificate)
+    fields = fields_of(certificate) | _beside_the_page(certificate)
     for element in root.iter():
-        element.text = Template((element.text or "").strip()).substitute(texts)
-    equipment = [_equipment(item) for item in certificate.equipment]
+        element.text = filled((element.text or "").strip(), fields)
+    equipment = [_equipment(certificate, item) for item in certificate.equipment]
     results = [_values(certificate), _profile(certificate), _artifact(certificate)]
+    for other in certificate.others:
+        listed = _listed_values(certificate, [other])
+        results.append({"name": _words("other"), "data": {"quantity": listed}})
     variable = {
         "measuringEquipments": {"measuringEquipment": equipment},
         "results": {"result": results},
-        "measurementMetaData": {"metaData": _conformity(certificate)},
+        "measurementMetaData": {"metaData": _conformity(certificate, fields)},
     }
     for name, tree in variable.items():
         (place,) = root.iterfind(f".//dcc:{name}", _SPACES)
         _grow(place, tree)
     _prune(root)
+    texts = certificate.texts["xml"]
+    for content in root.iterfind(".//dcc:content", _SPACES):
+        content.set("lang", fields["certificate_language"])
+        content.text = texts.get(content.text, content.text)
     ET.indent(root)
     return bytes(ET.tostring(root, encoding="utf-8", xml_declaration=True))
 
 
-def _texts(certificate: Certificate) -> dict[str, str]:
-    """Return what is filled into the constant parts."""
-    sections = certificate.sections
-    process = certificate.apparatus.process
-    conditions = sections["conditions"]
-    begin = conditions["start_time"][:10]
-    t = conditions["temperature"]
-    humidity = conditions["humidity"]
-    assumptions = []
-    for each in certificate.apparatus.assumptions:
-        size = f"{each.measure}: {each.size_text('conversion_constant')}"
-        assumptions.append(f"{each.sentence} {each.state.capitalize()}; {size}.")
-    texts = {}
-    for section in ("laboratory", "customer", "person", "sensor"):
-        for key in SECTIONS[section]:
-            texts[f"{section}_{key}"] = sections[section].get(key) or ""
-    return texts | {
-        "release": _release(__version__),
-        "release_of_artifact": _release(process.version),
-        "number": certificate.number,
-        "begin": begin,
-        "end": conditions["end_time"][:10] or begin,
-        "issued": certificate.issued,
-        "accreditation": certificate.accreditation,
-        "quality": " ".join(certificate.warnings) or "No check failed.",
-        "assumptions": " ".join(assumptions) or "None is recorded.",
-        "method": process.configuration.get("method", "not stated"),
-        "temperature": _numbers(t.value - ZERO_CELSIUS),
-        "temperature_expanded": _numbers(COVERAGE_FACTOR * t.uncertainty),
-        "humidity": _numbers(100 * humidity.value),
-        "humidity_expanded": _numbers(100 * COVERAGE_FACTOR * humidity.uncertainty),
-    }
+def _beside_the_page(certificate: Certificate) -> dict[str, str]:
+    """Return what the XML states beside the page: releases, and assumptions in one text."""
+    release = _release(certificate.apparatus.process.version)
+    fields = {"release": _release(__version__), "release_of_artifact": release}
+    listed = ["; ".join(row) for row in assumption_rows(certificate)]
+    if listed:
+        fields["assumptions"] = ". ".join(listed)
+    return fields
 
 
 def _release(version: str) -> str:
@@ -101,8 +84,6 @@ def _grow(parent: ET.Element, tree: Tree) -> None:
                 _grow(child, item)
             else:
                 child.text = item
-            if name == "content":
-                child.set("lang", "en")
 
 
 def _prune(element: ET.Element) -> None:
@@ -116,12 +97,11 @@ def _words(text: str) -> Tree:
     return {"content": text}
 
 
-def _equipment(item: Mapping[str, str]) -> Tree:
-    serial = {"issuer": "manufacturer", "value": item["serial"], "name": _words("Serial number")}
-    words = _words(f"Certificate of {item['date']}")
-    certificate = {"issuer": "other", "value": item["certificate"], "name": words}
-    identifications = {"identification": [serial, certificate]}
-    return {"name": _words(item["name"]), "identifications": identifications}
+def _equipment(certificate: Certificate, item: Mapping[str, str]) -> Tree:
+    serial = {"issuer": "manufacturer", "value": item["serial"], "name": _words("serial_number")}
+    words = _words(f"{certificate.words('xml', 'certificate_of')} {item['date']}")
+    document = {"issuer": "other", "value": item["certificate"], "name": words}
+    return {"name": _words(item["name"]), "identifications": {"identification": [serial, document]}}
 
 
 def _real(value: float, unit: str) -> Tree:
@@ -182,66 +162,69 @@ def _region(covariance: FloatArray, units: Sequence[str]) -> Tree:
 
 
 def _values(certificate: Certificate) -> Tree:
-    values = certificate.values
+    joint = _listed_values(certificate, certificate.values)
+    resolved = _real(certificate.apparatus.resolved_wavenumber / PER_MM, "rad/mm")
+    data = {"quantity": [joint, {"name": _words("resolved"), "si:real": resolved}]}
+    return {"name": _words("values"), "data": data}
+
+
+def _listed_values(certificate: Certificate, values: Sequence[CertifiedValue]) -> Tree:
     quantities = [value.quantity for value in values]
+    names = [quantity.name for quantity in quantities]
     scale = np.array([quantity.scale for quantity in quantities])
-    joint = _listed(
-        ", ".join(quantity.words for quantity in quantities),
+    return _listed(
+        ", ".join(certificate.words("quantities", name) for name in names),
         np.array([value.value for value in values]) / scale,
         [quantity.unit for quantity in quantities],
-        certificate.covariance / np.outer(scale, scale),
-        [quantity.name for quantity in quantities],
+        certificate.covariance_of(values) / np.outer(scale, scale),
+        names,
         np.array([value.factor for value in values]),
     )
-    words = _words("Wavenumber up to which the scan determines G")
-    resolved = _real(certificate.apparatus.resolved_wavenumber / PER_MM, "rad/mm")
-    data = {"quantity": [joint, {"name": words, "si:real": resolved}]}
-    return {"name": _words("Values"), "data": data}
 
 
 def _profile(certificate: Certificate) -> Tree:
     r = DIMENSIONS["length"]
     g = DIMENSIONS["per area"]
     profile = certificate.profile
-    radii = _listed("Radius r", profile.r / r.scale, [r.shown])
-    values = _listed("G(r)", profile.g / g.scale, [g.shown], profile.covariance / g.scale**2)
+    radii = _listed("radius", profile.r / r.scale, [r.shown])
+    values = _listed("profile", profile.g / g.scale, [g.shown], profile.covariance / g.scale**2)
     data = {"list": {"quantity": [radii, values]}}
-    return {"name": _words("Apparatus function G(r)"), "data": data}
+    return {"name": _words("apparatus_function"), "data": data}
 
 
 def _artifact(certificate: Certificate) -> Tree:
-    digest = f"Content digest of the artifact: {certificate.apparatus.content_digest}."
+    digest = certificate.apparatus.content_digest
     if not certificate.artifact:
-        data = {"text": _words(f"{digest} It is too large to be held here.")}
+        data = {"text": _words(f"{certificate.words('xml', 'too_large')} {digest}")}
     else:
         file = {
-            "description": _words(f"The artifact in its compact form. {digest}"),
+            "description": _words(f"{certificate.words('xml', 'artifact_held')} {digest}"),
             "fileName": f"{certificate.number.replace('/', '-')}.apparatus.h5",
             "mimeType": "application/x-hdf5",
             "dataBase64": base64.b64encode(certificate.artifact).decode("ascii"),
         }
         data = {"byteData": file}
-    return {"name": _words("Artifact"), "data": data}
+    return {"name": _words("artifact"), "data": data}
 
 
-def _conformity(certificate: Certificate) -> list[Tree]:
+def _conformity(certificate: Certificate, fields: Mapping[str, str]) -> list[Tree]:
     statements: list[Tree] = []
     for item in certificate.conformity:
         quantity = item.certified.quantity
-        numbers = {"Lower tolerance limit": item.lower, "Upper tolerance limit": item.upper}
-        numbers["Guard band"] = item.guard_band
+        numbers = {"lower_limit": item.lower, "upper_limit": item.upper}
+        numbers["guard_band"] = item.guard_band
         shown = []
         for name, number in numbers.items():
             if np.isfinite(number):
                 real = _real(number / quantity.scale, quantity.unit)
                 shown.append({"name": _words(name), "si:real": real})
         probability = _real(item.probability, "1")
-        shown.append({"name": _words("Conformance probability"), "si:real": probability})
+        shown.append({"name": _words("probability"), "si:real": probability})
         statements.append(
             {
-                "name": _words(f"Conformity of the {quantity.words}"),
+                "name": _words(certificate.words("quantities", quantity.name)),
                 "norm": "JCGM 106:2012",
-                "declaration": _words(f"Decision rule: {certificate.decision}"),
+                "declaration": _words(fields["decision"]),
                 "conformity": "pass" if item.accepted else "noPass",
                 "data": {"quantity": shown},
             }

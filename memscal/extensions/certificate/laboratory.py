@@ -29,16 +29,28 @@ RULES = ("simple acceptance", "guarded acceptance")
 """Decision rules: whether a value must lie within its tolerance, or clear of its limits."""
 KINDS = {"load cell": "load_cell", "stage": "stage"}
 """Kinds of equipment that scans and artifacts carry, with their attributes there."""
+MEASURED_BY = {
+    "load": "load cell",
+    "reading": "voltmeter",
+    "position": "stage",
+    "thickness": "thickness gauge",
+    "radius": "radius gauge",
+}
+"""Quantities that enter a calibration, with the kind of equipment that measures each."""
+TEXTS = Path(__file__).with_name("texts")
+"""Folder of the texts of certificates, a file for each language."""
+_LANGUAGES = sorted(path.stem for path in TEXTS.glob("*.toml"))
 
 # A star: a certificate needs it. After a colon its kind, if it is not text on one line.
-_ADDRESS = "street post_code city* country*:country email phone"
+_ADDRESS = "street post_code city* country*:country contact email phone"
 _KEYS = {
     "laboratory": f"name* {_ADDRESS} accreditation prefix:code number:code",
     "customer": f"name* {_ADDRESS}",
     "person": "name* role* operator",
     "sensor": "name* model manufacturer* serial*",
-    "equipment": "name* kind serial* certificate* date*:date",
+    "equipment": "name* kind:kind serial* certificate* date*:date",
     "conditions": "temperature*:temperature humidity*:dimensionless start_time*:time end_time:time",
+    "certificate": "language:language place received:date condition deviations remarks replaces",
     "decision": " ".join(
         ["rule:rule guard_band:number", *(f"{name}:limits" for name in ESTIMATED)]
     ),
@@ -59,6 +71,11 @@ _FORMS = {
     "country": ("[A-Z]{2}", "two capital letters (ISO 3166-1)"),
     "code": ("[A-Za-z0-9 ._/-]{1,40}", "of up to 40 letters, digits, blanks, and . _ / -"),
     "rule": ("|".join(RULES), " or ".join(f'"{rule}"' for rule in RULES)),
+    "kind": (
+        "|".join(MEASURED_BY.values()),
+        f"one of {', '.join(MEASURED_BY.values())}, or left out",
+    ),
+    "language": ("|".join(_LANGUAGES), ", ".join(_LANGUAGES)),
 }
 #: Keys of the file whose attributes have other names.
 _NAMES = {"serial": "serial_number", "date": "certificate_date"}
@@ -146,7 +163,7 @@ def read_laboratory(path: FilePath) -> LaboratoryFile:
     for kind in KINDS:
         if sum(item.get("kind") == kind for item in listed) > 1:
             raise FormatError(f"{name} has more than one {kind}.", cure="Leave all but one out.")
-    known = [*NEEDED, "decision", "uncertainties"]
+    known = [*NEEDED, "certificate", "decision", "uncertainties"]
     for section in content:
         _require_known(name, section, known)
     sections = {key: _section(f"{name}: [{key}]", key, item) for key, item in content.items()}

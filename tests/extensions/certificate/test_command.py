@@ -10,7 +10,7 @@ from helpers.folders import SHIPPED
 
 @pytest.fixture
 def inputs(tmp_path, monkeypatch):
-    """The shipped artifact, and the shipped file of a laboratory for its sensor."""
+    """The shipped artifact, of which two uncertainties are not stated, and a laboratory's file."""
     monkeypatch.chdir(tmp_path)
     shutil.copy(SHIPPED / "rod_scan_65.apparatus.h5", "scan.apparatus.h5")
     shutil.copy(SHIPPED / "lab.toml", "lab.toml")
@@ -18,14 +18,18 @@ def inputs(tmp_path, monkeypatch):
 
 
 def test_a_certificate_is_replaced_only_if_forced_and_is_told_as_json(run, inputs):
-    run("certificate", *inputs, "-o", "c.xml").exits(0)
-    run("certificate", *inputs, "-o", "c.xml").exits(4, "c.xml")
-    made = run("certificate", *inputs, "-o", "c.xml", "--force", "--json").exits(0).json
+    run("certificate", *inputs, "-o", "c.xml").exits(3, "--gain-uncertainty", "--incomplete")
+    inputs = (*inputs, "--incomplete", "-o", "c.xml")
+    run("certificate", *inputs).exits(0, "Warning: The certificate is incomplete")
+    run("certificate", *inputs).exits(4, "c.xml")
+    made = run("certificate", *inputs, "--force", "--json").exits(0).json
     assert made["number"].encode() in Path("c.xml").read_bytes()
-    assert [item["conforms"] for item in made["conformity"]] == [True]
+    assert made["conformity"] == []
+    assert ["gain" in made["missing"][0], "scale" in made["missing"][1]] == [True, True]
 
 
-def test_without_weasyprint_the_pdf_is_refused_with_the_extra(run, inputs, monkeypatch):
-    monkeypatch.setitem(sys.modules, "weasyprint", None)
+def test_without_typst_the_pdf_is_refused_with_the_extra(run, inputs, monkeypatch):
+    monkeypatch.setitem(sys.modules, "typst", None)
+    inputs = (*inputs, "--incomplete")
     run("certificate", *inputs, "-o", "c.pdf").exits(3, ".[certificate]")
     run("certificate", *inputs, "-o", "c.html").exits(0)

@@ -10,7 +10,9 @@ from hypothesis import strategies as st
 import memscal
 from memscal.errors import InputError
 from memscal.extensions.certificate.certificate import CertifiedValue, Conformity, certify
+from memscal.extensions.certificate.dcc import certificate_xml
 from memscal.extensions.certificate.laboratory import NEEDED, LaboratoryFile
+from memscal.extensions.certificate.page import certificate_page, page_of
 from memscal.model.quantities import ESTIMATED
 
 LIMITS = "conversion_constant"
@@ -28,6 +30,34 @@ def test_a_file_without_equipment_is_refused_for_its_load_cell(apparatus, labora
         certify(apparatus, replace(laboratory, equipment=()))
 
 
+def test_all_that_is_not_stated_is_named_in_one_list_with_its_cure(apparatus, laboratory):
+    scan = replace(
+        memscal.simulate(seed=1, points=33),
+        film=replace(apparatus.film, thickness_uncertainty=None),
+        indenter=memscal.Rod(radius=apparatus.indenter.radius),
+        load_uncertainty=None,
+    )
+    calibrated = memscal.calibrate(scan).apparatus
+    failed = memscal.QualityCheck("symmetry", 2.0, 1.0, False, "Left and right differ.")
+    lacking = replace(calibrated, sensor=memscal.StressSensor(), checks=(failed,))
+    with pytest.raises(InputError) as refusal:
+        certify(lacking, stating(laboratory, "person", role=None))
+    names = ("gain", "position-scale", "load", "thickness", "radius")
+    cures = [f"(memscal import --{name}-uncertainty)" for name in names]
+    cures += ["(memscal explain symmetry)", "([person] role in lab.toml)"]
+    assert [cure for cure in cures if cure not in refusal.value.problem] == []
+    made = certify(lacking, laboratory, incomplete=True)
+    assert (len(made.missing), made.conformity) == (6, ())
+
+
+def test_an_incomplete_certificate_is_written_without_anything_of_the_file(apparatus, laboratory):
+    empty = replace(laboratory, sections={}, equipment=())
+    made = certify(apparatus, empty, incomplete=True)
+    assert "equipment of kind load cell" in str(made.missing)
+    assert "equipment of kind load cell" in certificate_page(page_of(made))
+    assert certificate_xml(made)
+
+
 @pytest.mark.parametrize(("section", "key"), [(s, key) for s in NEEDED for key in NEEDED[s]])
 def test_one_mandatory_field_that_is_missing_is_named_alone(apparatus, laboratory, section, key):
     place = "[[equipment]] 1" if section == "equipment" else f"[{section}]"
@@ -38,7 +68,9 @@ def test_one_mandatory_field_that_is_missing_is_named_alone(apparatus, laborator
         changed = stating(laboratory, section, **{key: None})
     with pytest.raises(InputError) as refusal:
         certify(apparatus, changed)
-    assert f"lacks 1 mandatory fields: {place} {key}." in refusal.value.problem
+    assert refusal.value.problem.startswith("The certificate lacks: ")
+    assert refusal.value.problem.endswith(f"({place} {key} in lab.toml).")
+    assert ";" not in refusal.value.problem
 
 
 def test_what_the_artifact_states_need_not_be_in_the_file(apparatus, laboratory, certificate):
@@ -105,6 +137,28 @@ def conformity(y, u, lower, upper, guard=0.0):
 )
 def test_the_conformance_probability_is_that_of_a_normal_distribution(y, lower, upper, expected):
     assert conformity(y, 0.1, lower, upper).probability == pytest.approx(expected, abs=1e-8)
+
+
+@pytest.mark.parametrize("bounds", [(), (0.08,), (0.05, 0.07)])
+@pytest.mark.parametrize("degrees", [4.0, 30.0, np.inf])
+def test_the_conformance_probability_is_that_of_errors_that_are_drawn(bounds, degrees):
+    # Noise of few degrees of freedom and another Gaussian make up what no rectangle does.
+    rest = np.sqrt(0.1**2 - sum(u**2 for u in bounds))
+    value = CertifiedValue(ESTIMATED[LIMITS], 1.0, 0.1, 2.0, degrees, bounds)
+    rng = np.random.default_rng(1)
+    count = 400_000
+    # Welch and Satterthwaite: of the whole u, then of the part without the rectangles.
+    own = max(degrees * (rest / 0.1) ** 4, 1.0)
+    noise = rng.standard_normal(count)
+    if np.isfinite(own):
+        noise = noise / np.sqrt(rng.chisquare(own, count) / own)
+    errors = rest * noise
+    for u in bounds:
+        errors += rng.uniform(-np.sqrt(3) * u, np.sqrt(3) * u, count)
+    for lower, upper in ((0.9, 1.15), (-np.inf, 1.1), (0.75, np.inf)):
+        drawn = np.mean((errors > lower - 1.0) & (errors < upper - 1.0))
+        # Four standard deviations of such a share.
+        assert value.probability(lower, upper) == pytest.approx(drawn, abs=2 / np.sqrt(count))
 
 
 @given(st.floats(-10, 10), st.floats(1e-3, 3), st.floats(-10, 10), st.floats(0, 10))

@@ -22,7 +22,7 @@ def read(text):
     ("text", "words"),
     [
         ("[laboratories]\nname = 'a'", "Did you mean laboratory?"),
-        ("[load_cell]\nname = 'a'", "equipment, conditions, decision"),
+        ("[load_cell]\nname = 'a'", "equipment, conditions, certificate"),
         ("[sensor]\nserial_number = '1'", "Did you mean serial?"),
         ("[decision]\ngaussian_sigm = {lower = 1, unit = 'mm'}", "Did you mean gaussian_sigma?"),
         ("[laboratory]\nname = 5", "[laboratory] name is 5, but should be text"),
@@ -42,6 +42,8 @@ def read(text):
         ("[conditions]\nstart_time = 'noon'", "2026-11-20T09:30:00+01:00"),
         ("[[equipment]]\nname = 'a'\ndate = 2026-01-01T10:00:00", "be a date"),
         ("[[equipment]]\nkind = 'stage'\n[[equipment]]\nkind = 'stage'", "more than one stage"),
+        ("[[equipment]]\nkind = 'volt meter'", "one of load cell, voltmeter, stage"),
+        ("[certificate]\nlanguage = 'xx'", "should be en"),
         ("[equipment]\nname = 'a'", "[[equipment]]"),
         ("[sensor\n", "no TOML"),
     ],
