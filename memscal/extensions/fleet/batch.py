@@ -11,6 +11,7 @@ from functools import cached_property
 from itertools import islice
 from pathlib import Path
 
+from memscal.apparatus import ApparatusFunction
 from memscal.calibration.calibrate import calibrate
 from memscal.cli.import_ import read_table
 from memscal.cli.options import Options
@@ -24,7 +25,6 @@ from memscal.extensions.fleet.shards import (
     FleetScan,
     arrow,
     fleet_row,
-    make_folder,
     manifest_scans,
     read_batch,
     read_shard,
@@ -32,10 +32,9 @@ from memscal.extensions.fleet.shards import (
     write_batch,
     write_shard,
 )
-from memscal.formats.files import HDF5_SUFFIXES, ensure_writable, read_bytes
+from memscal.formats.files import HDF5_SUFFIXES, read_bytes
 from memscal.formats.scan import read_scan
 from memscal.model.arrays import Values
-from memscal.model.checks import Message
 from memscal.model.provenance import timestamp
 from memscal.model.scan import Scan
 from memscal.version import __version__
@@ -87,6 +86,7 @@ class Batch:
     artifacts: str
     words: Values
     recipe: Options | None = None
+    anew: bool = False  # no shard stays
     shard_size: int | None = None  # by default from the number of scans
     count: int = 0  # of scans
     version: str = __version__
@@ -121,11 +121,6 @@ class Batch:
             return read_table(path, self.recipe)
         return read_scan(path, accept_altered=self.options.get("accept_altered", False))
 
-    def notes(self, scan: FleetScan) -> Sequence[Message]:
-        """Read a scan or table; return the notes on it."""
-        read = self.read(self.folder / scan.path)
-        return getattr(read, "messages", ())
-
     def shards(self) -> Iterator[Shard]:
         """Yield the shards in their order, listing the scans as they are needed."""
         assert self.shard_size is not None
@@ -138,27 +133,27 @@ class Batch:
         """Return the path of a shard's table."""
         return self.results / "shards" / f"{shard.name}.parquet"
 
-    def prepare(self, *, resume: bool, force: bool) -> "Batch":
+    def prepare(self, *, resume: bool) -> "Batch":
         """Return the batch with its scans counted, if the folder of results may be used."""
         arrow()
         results = self.results
         count = self._counted()
-        begun = read_batch(results)
         stays = "It may hold results, which are not replaced."
         with suppress(FileNotFoundError, NotADirectoryError):
-            free = resume or (force and begun)
+            free = resume or self.anew
             if not free and any(path.is_file() for path in results.rglob("*")):
                 raise OutputError(
                     f"The folder {results} exists.",
                     why=stays,
-                    cure="Continue a batch with --resume, repeat it with --force, or give another "
+                    cure="Continue them with --resume, do them anew with --force, or give another "
                     "folder.",
                 )
-        done = shard_paths(results) if resume else []
-        if done and not force:
+        begun = read_batch(results)
+        done = shard_paths(results)
+        if done and not self.anew:
             self._require_same(begun.get("options", {}))
         balanced = min(max(_SMALLEST, -(-count // _SHARDS)), _LARGEST)
-        size = self.shard_size or (resume and begun.get("shard_size")) or balanced
+        size = self.shard_size or begun.get("shard_size") or balanced
         shards = -(-count // size)
         numbers = [int(path.stem.rpartition("-")[2]) for path in done]
         if max(numbers, default=0) >= shards:
@@ -184,14 +179,6 @@ class Batch:
                 cure="Give the options as they were, or another folder; --force does all anew.",
             )
 
-    def begin(self, *, resume: bool) -> None:
-        """Make the folder of results; what an earlier batch left there goes, unless it resumes."""
-        if not resume:
-            for name in ("shards", "artifacts"):
-                shutil.rmtree(self.results / name, ignore_errors=True)
-        make_folder(self.results / "shards")
-        ensure_writable(self.results / "shards" / "proof")
-
     def _counted(self) -> int:
         """Return how many scans there are; refuse a list of which none is there."""
         count = 0
@@ -202,7 +189,7 @@ class Batch:
             first = first or scan.path
             there = there or (self.folder / scan.path).exists()
         source = self.sources[0]
-        if not (self.recipe or first.lower().endswith(HDF5_SUFFIXES)):
+        if not first or (not self.recipe and first.lower().endswith(TABLE_SUFFIXES)):
             raise MemscalError(
                 f"{source} holds no scans, which are HDF5.",
                 why="Tables (CSV, ...) are read by a recipe, which states columns, film and load.",
@@ -261,7 +248,7 @@ def run_shard(batch: Batch, shard: Shard) -> ShardOutcome:
             f"A worker has memscal {__version__}, the batch {batch.version}.",
             cure="Install the same version everywhere.",
         )
-    rows = _kept_rows(batch, shard)
+    rows = [] if batch.anew else _kept_rows(batch, shard)
     kept = bool(rows)
     if not kept:
         # Artifacts of what was there before are of other scans or options.
@@ -312,23 +299,14 @@ def _row(batch: Batch, shard: Shard, i: int) -> Values:
         "path": _relative(path, batch.results),
         "passed": False,
         "calibrated_at": timestamp(),
+        "input_sha256": _sha256_of_file(path),
         "options_sha256": batch.options_sha256,
         "version": batch.version,
         "error": None,
     }
-    scan = attempted(item.path, lambda: batch.read(path))
-    if isinstance(scan, MemscalError):
-        return row | _error_columns(scan) | {"input_sha256": _sha256_of_file(path)}
-    if batch.recipe and batch.recipe["name_pattern"] and item.wafer_x is None:
-        row |= place_in_name(path, batch.recipe)
-    named = {"sensor": item.sensor or scan.sensor.name, "start_time": scan.start_time}
-    row |= asdict(scan.sensor) | named
-    row["input_sha256"] = scan.source and scan.source.sha256
-    apparatus = attempted(
-        item.path, lambda: calibrate(scan, other=False, **batch.options).apparatus
-    )
+    apparatus = attempted(item.path, lambda: _calibrated(batch, path, row))
     if isinstance(apparatus, MemscalError):
-        return row | _error_columns(apparatus)
+        return row | {"error_class": type(apparatus).__name__, "error": str(apparatus)}
     if batch.artifacts == "all" or (batch.artifacts == "failed" and not apparatus.passed):
         name = f"{shard.first + i:07d}-{path.stem[:_LONGEST_STEM]}.apparatus.h5"
         artifact = Path("artifacts", shard.name, name)
@@ -338,12 +316,18 @@ def _row(batch: Batch, shard: Shard, i: int) -> Values:
     return row | fleet_row(apparatus)
 
 
+def _calibrated(batch: Batch, path: Path, row: Values) -> ApparatusFunction:
+    """Calibrate with a scan; add what it states to its row."""
+    scan = batch.read(path)
+    row |= asdict(scan.sensor) | {"start_time": scan.start_time}
+    row["sensor"] = row["sensor"] or scan.sensor.name
+    if batch.recipe and batch.recipe["name_pattern"] and row["wafer_x"] is None:
+        row |= place_in_name(path, batch.recipe)
+    return calibrate(scan, other=False, **batch.options).apparatus
+
+
 def _relative(path: Path, folder: Path) -> str:
     """Return a path as seen from a folder; on another disk as it is."""
     with suppress(ValueError):
         return Path(os.path.relpath(path, folder)).as_posix()
     return str(path)
-
-
-def _error_columns(error: MemscalError) -> dict[str, str]:
-    return {"error_class": type(error).__name__, "error": str(error)}

@@ -63,7 +63,7 @@ Examples:
 @calibration_options
 @report_option
 @option("--force", is_flag=True)(
-    "Calibrate all anew, or with --resume what has other options; replace the page of --report."
+    "Calibrate every scan anew, with whatever options; replace the page of --report, too."
 )
 @option("--dry-run", is_flag=True)("Read every input, say which are refused, and write nothing.")
 @json_option
@@ -99,24 +99,24 @@ def command(
     from memscal.extensions.fleet.batch import Batch
     from memscal.extensions.fleet.import_tables import attempt_all
     from memscal.extensions.fleet.recipe import recipe_of
-    from memscal.extensions.fleet.shards import expanded, read_fleet, shard_paths
+    from memscal.extensions.fleet.shards import expanded, make_folder, read_fleet, shard_paths
 
     chosen = calibration_settings(**settings)
     results = Path(os.path.realpath(results))
     paths = [Path(os.path.realpath(path)) for path in expanded(sources)]
     words, reading = recipe_of(recipe) if recipe else ({}, None)
     words |= settings | {"artifacts": artifacts}
-    batch = Batch(paths, results, chosen, artifacts, words, reading, shard_size)
+    batch = Batch(paths, results, chosen, artifacts, words, reading, force, shard_size)
     if report is not None and results not in Path(os.path.realpath(report)).parents:
         scans = batch.scans() if report.exists() else ()
         inputs = [*paths, *(batch.folder / scan.path for scan in scans)]
         out.prove_writable([report], force=force, inputs=inputs)
-    batch = batch.prepare(resume=resume, force=force)
+    batch = batch.prepare(resume=resume)
     if dry_run:
         numbers = {"scans": batch.count, "shards": len(list(batch.shards()))}
-        jobs = {scan.path: partial(batch.notes, scan) for scan in batch.scans()}
+        jobs = {scan.path: partial(batch.read, batch.folder / scan.path) for scan in batch.scans()}
         return CHECK_FAILED if attempt_all(jobs, numbers, as_json=as_json) else DONE
-    batch.begin(resume=resume)
+    make_folder(results / "shards")
     start = monotonic()
     out.prove_writable([report], force=force)  # in the folder of results, too, which is there now
     total = batch.count

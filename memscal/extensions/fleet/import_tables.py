@@ -1,6 +1,6 @@
 """Import of several tables, each by itself, to a folder of scans."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -41,7 +41,8 @@ def import_tables(context: click.Context, options: Options) -> int:
     counts = {"tables": len(targets), "kept": len(targets) - len(wanted)}
     refused = attempt_all(jobs, counts, as_json=asked["as_json"])
     if not asked["dry_run"]:
-        files = {recipe: recipe_text(context)} if recipe else {}
+        worked = len(refused) < len(jobs)
+        files = {recipe: recipe_text(context)} if recipe and worked else {}
         if options["name_pattern"]:
             lines = ["path,sensor,wafer_x,wafer_y"]
             for path, table in targets.items():
@@ -86,7 +87,7 @@ def attempt_all(
             if isinstance(done, MemscalError):
                 refused[name] = done
             else:
-                notes += done
+                notes += done if isinstance(done, Sequence) else getattr(done, "messages", ())
     numbers = {**counts, "read": len(jobs) - len(refused), "refused": len(refused)}
     if as_json:
         problems = [{"path": name, **vars(error)} for name, error in refused.items()]
