@@ -62,7 +62,7 @@ Examples:
 \b
 Exit codes:
   0    done
-  1    done, but a quality check failed, or a scan of a batch; the results say so
+  1    done, but a quality check failed, or one of several scans or tables; the results say so
   2    wrong usage of a command
   3    the input was refused
   4    the outputs were not written; what was there before is untouched

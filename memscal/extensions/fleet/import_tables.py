@@ -11,7 +11,7 @@ from memscal.cli import output as out
 from memscal.cli.failures import CHECK_FAILED, DONE
 from memscal.cli.import_ import convert, prepared
 from memscal.cli.options import Options
-from memscal.errors import InputError, MemscalError, OutputError
+from memscal.errors import InputError, MemscalError
 from memscal.extensions.fleet.many import attempted
 from memscal.extensions.fleet.recipe import place_in_name, recipe_text
 from memscal.extensions.fleet.shards import TABLE_SUFFIXES, expanded, make_folder, manifest_scans
@@ -26,30 +26,32 @@ def import_tables(context: click.Context, options: Options) -> int:
     folder: Path = asked["output"]
     recipe = asked["save_recipe"]
     force = asked["force"]
+    writing = not asked["dry_run"]
     targets = _targets(expanded(asked["tables"]), folder)
     options = prepared(targets.values(), asked["kind"], options)
     wanted = [path for path in targets if not (asked["resume"] and path.exists())]
-    jobs = {}
-    for path in wanted:
-        output = None if asked["dry_run"] else path
-        job = partial(convert, targets[path], output, asked["kind"], options, force=force)
-        jobs[str(targets[path])] = job
-    if not asked["dry_run"]:
+    if writing:
         there = [path for path in wanted if path.exists()]
         out.prove_writable([*there, recipe], force=force, inputs=targets.values())
         make_folder(folder)
+    jobs = {}
+    for path in wanted:
+        output = path if writing else None
+        job = partial(convert, targets[path], output, asked["kind"], options, force=force)
+        jobs[str(targets[path])] = job
     counts = {"tables": len(targets), "kept": len(targets) - len(wanted)}
     refused = attempt_all(jobs, counts, as_json=asked["as_json"])
-    if not asked["dry_run"]:
-        worked = len(refused) < len(jobs)
-        files = {recipe: recipe_text(context)} if recipe and worked else {}
-        if options["name_pattern"]:
-            lines = ["path,sensor,wafer_x,wafer_y"]
-            for path, table in targets.items():
-                if str(table) not in refused:
-                    place = place_in_name(table, options).values()
-                    lines.append('"{}","{}",{},{}'.format(path.name, *place))
-            files[folder / "manifest.csv"] = "\n".join([*lines, ""])
+    files = {}
+    if recipe and len(refused) < len(jobs):
+        files[recipe] = recipe_text(context)
+    if options["name_pattern"]:
+        lines = ["path,sensor,wafer_x,wafer_y"]
+        for path, table in targets.items():
+            if str(table) not in refused:
+                place = place_in_name(table, options).values()
+                lines.append('"{}","{}",{},{}'.format(path.name, *place))
+        files[folder / "manifest.csv"] = "\n".join([*lines, ""])
+    if writing:
         out.write_files({path: text.encode() for path, text in files.items()}, force=True)
         out.say_written([folder, *files])
     return CHECK_FAILED if refused else DONE
@@ -82,8 +84,6 @@ def attempt_all(
     attempts = ((name, attempted(name, job)) for name, job in jobs.items())
     with out.working("Reading"):
         for name, done in Task("tables", len(jobs)).counted(attempts):
-            if isinstance(done, OutputError):
-                raise done
             if isinstance(done, MemscalError):
                 refused[name] = done
             else:
