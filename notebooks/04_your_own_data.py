@@ -18,9 +18,9 @@
 # %% [markdown]
 # # Your own data: from tables to a friction coefficient
 #
-# From three tables (a scan with a thin rod, and scans of contacts with a sphere, dry and
-# lubricated) this notebook estimates the friction coefficient of the contact with its interval, and
-# states what to check at each step. Replace the tables and the numbers in the commands by yours.
+# From tables (scans with a thin rod, and scans of contacts with a sphere, dry and lubricated) this
+# notebook estimates the friction coefficient of the contact with its interval, and states what to
+# check at each step. Replace the tables and the numbers in the commands by yours.
 #
 # **The tables here are synthetic.** They were calculated for an invented film, sensor and sphere,
 # with a friction coefficient of 0.12; `calibration_data/make_tables.py` made them.
@@ -38,8 +38,9 @@ from IPython.display import Markdown
 
 import memscal
 
-TABLES = Path("../calibration_data/tables")
+TABLES = Path("../calibration_data/tables").resolve()
 MM, MV = 1e-3, 1e-3  # memscal computes in SI units
+KNOWN = ("young_modulus", "poisson_ratio", "thickness", "law")  # of the film
 
 # %matplotlib inline
 scratch = TemporaryDirectory()  # where the files of this notebook go
@@ -59,11 +60,13 @@ print("".join((TABLES / "sphere_dry.csv").read_text().splitlines(keepends=True)[
 
 
 # %% [markdown]
-# ## 2. Import
+# ## 2. Import, by a recipe
 #
 # The heads of this table state the units; the options state the indenter and the film. Each
 # *standard uncertainty* that you state here is propagated to the friction coefficient, and one that
 # you leave out counts as zero. At the terminal you would type what follows `memscal`.
+#
+# The options are found with one table, and `--save-recipe` keeps them for all others.
 
 
 # %%
@@ -71,10 +74,10 @@ def run(line):
     """Run a command of memscal as at the terminal, and show its output."""
     process = subprocess.run(
         [sys.executable, "-m", "memscal", *shlex.split(line)],
-        capture_output=True, text=True, check=False,
+        cwd=folder, capture_output=True, text=True, check=False,
     )  # fmt: skip
-    print(process.stdout.replace(str(folder), "."))
-    print(process.stderr.replace(str(folder), "."))
+    print(process.stdout)
+    print(process.stderr)
 
 
 FILM = (
@@ -82,26 +85,44 @@ FILM = (
     "--poisson-ratio-uncertainty 0.003 --thickness 1.5 --thickness-uncertainty 0.015 "
     "--film-law neo-hookean "
 )
-COLUMNS = '--x "x (mm)" --x-unit mm --u "U (mV)" --u-unit mV --sensor-name S7 '
+COLUMNS = '--x "x (mm)" --x-unit mm --u "U (mV)" --u-unit mV '
 SPHERE = (
     '--indenter sphere --radius 60 --radius-uncertainty 0.2 --load-column "set load (N)" '
     '--repeat "set load (N)" --repeat pass --load-uncertainty 0.004 --load-scatter 1 '
-    "--position-error 10 "
+    "--position-error 10 --sensor-name S7 "
 )
 
+rods = folder / "rods"  # the tables of your sensors, here one, and one in which nothing stands
+rods.mkdir()
+(rods / "S7.csv").write_text((TABLES / "rod.csv").read_text())
+(rods / "S8.csv").write_text("pass,x (mm),U (mV)\n")
+
 run(
-    f"import {TABLES}/rod.csv -o {folder}/rod.h5 {COLUMNS} {FILM} --repeat pass "
+    f"import rods/S7.csv -o rod.h5 {COLUMNS} {FILM} --repeat pass "
     "--radius 0.3 --radius-uncertainty 0.002 --load 0.5 --load-uncertainty 0.0025 "
-    "--rod-friction inf"
+    "--rod-friction inf --save-recipe rod.toml"
 )
+print((folder / "rod.toml").read_text())
+
+# %% [markdown]
+# By the recipe the whole folder is read, hundreds of tables as well. The names of the files are
+# those of the sensors. A table that cannot be read is a row with its cause; the others are written.
+
+# %%
+run("import rods -o scans --recipe rod.toml --name-pattern {sensor}")
+
+# %% [markdown]
+# The tables of the contacts have a recipe of their own. An option beats it, here what was between
+# sphere and film.
 
 # %%
 run(
-    f"import {TABLES}/sphere_dry.csv -o {folder}/dry.h5 {COLUMNS} {FILM} {SPHERE} --lubrication dry"
+    f"import {TABLES}/sphere_dry.csv -o dry.h5 {COLUMNS} {FILM} {SPHERE} "
+    "--lubrication dry --save-recipe sphere.toml"
 )
 run(
-    f"import {TABLES}/sphere_lubricated.csv -o {folder}/lubricated.h5 {COLUMNS} {FILM} {SPHERE} "
-    "--lubrication lubricated --lubricant glycerol"
+    f"import {TABLES}/sphere_lubricated.csv -o lubricated.h5 "
+    "--recipe sphere.toml --lubrication lubricated --lubricant glycerol"
 )
 
 # %% [markdown]
@@ -117,14 +138,24 @@ run(
 #
 # ## 3. Look at the scans
 #
+# First the numbers, as they were read: are these the columns, the units and the passes that you
+# meant?
+
+# %%
+rod, dry, lubricated = (
+    memscal.read_scan(folder / f"{name}.h5") for name in ("scans/S7", "dry", "lubricated")
+)
+rows = ["| x (mm) | " + " | ".join(f"U (mV), pass {i + 1}" for i in range(len(rod.u_zz))) + " |"]
+rows += ["|-" * (1 + len(rod.u_zz)) + "|"]
+for x, readings in list(zip(rod.x, rod.u_zz.T, strict=True))[:5]:
+    rows.append(f"| {x / MM:.3f} | " + " | ".join(f"{u / MV:.4f}" for u in readings) + " |")
+Markdown("\n".join(rows))
+
+# %% [markdown]
 # Each scan should have a peak near the middle, flat ends, and as much length beyond the contact as
 # within it. A scan that ends on a slope does not determine its baseline.
 
 # %%
-rod, dry, lubricated = (
-    memscal.read_scan(folder / f"{name}.h5") for name in ("rod", "dry", "lubricated")
-)
-
 fig, axes = plt.subplots(1, 3, sharex=True)
 for ax, scan, name in zip(axes, (rod, dry, lubricated), ("rod", "dry", "lubricated"), strict=True):
     ax.plot(scan.x / MM, scan.u_zz.T / MV, ".", ms=3)
@@ -158,6 +189,35 @@ calibration.plot()
 #   halves it;
 # - **the checks**: all passed here. `docs/quality.md` explains each one.
 #
+# What is not stated is not counted. The recipe states film, rod and load, with their uncertainties,
+# but neither the gain of the sensor's chain nor the scale of the stage. What half a percent of each
+# would cost, and what the others do:
+
+# %%
+unstated = replace(
+    rod,
+    film=memscal.ElasticFilm(**{name: getattr(rod.film, name) for name in KNOWN}),
+    indenter=memscal.Rod(radius=rod.indenter.radius),
+    load_uncertainty=None,
+)
+in_full = replace(rod, gain_uncertainty=0.005, position_scale_uncertainty=0.005)
+for what, scan in (("nothing stated", unstated), ("as it is", rod), ("in full", in_full)):
+    found = memscal.calibrate(scan, method="bayesian").apparatus
+    share = found.parameters.uncertainty("conversion_constant") / found.conversion_constant
+    print(f"u(A) {what}: {share:.2%}")
+
+# %% [markdown]
+# The rest is taken for granted. The table has for each assumption the size of an error that moves A
+# by its standard uncertainty: where yours may be as large, state its uncertainty in the recipe.
+
+# %%
+rows = ["| assumption | | size that moves A by u(A) | of |", "|-|-|-|-|"]
+for assumption in apparatus.assumptions:
+    size = assumption.size_text("conversion_constant")
+    rows.append(f"| {assumption.sentence} | {assumption.state} | {size} | {assumption.measure} |")
+Markdown("\n".join(rows))
+
+# %% [markdown]
 # ## 5. The measured stress
 #
 # Baseline and centre of every load are estimated, and $S_{zz} = U/A$ has its uncertainty by
@@ -362,12 +422,13 @@ except memscal.MemscalError as error:
 # Every step has its command, with figures and JSON:
 
 # %%
-run(f"apply {folder}/sensor.apparatus.h5 {folder}/lubricated.h5 -o {folder}/lubricated.stress.h5")
+run("apply sensor.apparatus.h5 lubricated.h5 -o lubricated.stress.h5")
 scratch.cleanup()
 
 # %% [markdown]
 # ```console
-# memscal calibrate rod.h5 -o sensor.apparatus.h5 --figure calibration.pdf
+# memscal import rods/*.csv -o scans --recipe rod.toml --name-pattern "{sensor}"
+# memscal calibrate scans/S7.h5 -o sensor.apparatus.h5 --figure calibration.pdf
 # memscal apply sensor.apparatus.h5 dry.h5 lubricated.h5 -o contacts.stress.h5 --figure stress.pdf
 # memscal compare sensor.apparatus.h5 dry.h5 lubricated.h5 --figures figures
 # ```
