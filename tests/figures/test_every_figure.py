@@ -14,7 +14,7 @@ from matplotlib.transforms import Bbox
 
 import memscal
 from memscal.cli.compare import figure_stems
-from memscal.extensions.fleet.results import FleetResults
+from memscal.extensions.fleet.results import Failure, FleetResults
 from memscal.figures.calibration import calibration_figure
 from memscal.figures.style import house_style
 
@@ -33,6 +33,7 @@ def fleet():
     x, y = np.divmod(np.arange(60.0), 8)
     return FleetResults(
         paths=[f"{i}.h5" for i in range(60)],
+        sensors=[f"W7-{i}" for i in range(60)],
         conversion_constant=values,
         unit="mV/Pa",
         conversion_constant_errors=0.01 * values,
@@ -41,7 +42,7 @@ def fleet():
         wafer_x=x,
         wafer_y=y,
         failed={3: ("symmetry",)},
-        errors={7: ("InputError", "The scan has no point.")},
+        errors={7: Failure("InputError", "The scan has no point.", "Add some.")},
     )
 
 

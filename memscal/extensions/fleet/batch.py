@@ -306,7 +306,8 @@ def _row(batch: Batch, shard: Shard, i: int) -> Values:
     }
     apparatus = attempted(item.path, lambda: _calibrated(batch, path, row))
     if isinstance(apparatus, MemscalError):
-        return row | {"error_class": type(apparatus).__name__, "error": str(apparatus)}
+        parts = vars(apparatus)  # problem and cure among them
+        return row | {"error_class": type(apparatus).__name__, "error": str(apparatus), **parts}
     if batch.artifacts == "all" or (batch.artifacts == "failed" and not apparatus.passed):
         name = f"{shard.first + i:07d}-{path.stem[:_LONGEST_STEM]}.apparatus.h5"
         artifact = Path("artifacts", shard.name, name)

@@ -1,10 +1,12 @@
 """Results of a fleet of sensors: what a summary needs of their calibrations."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import field
+from typing import NamedTuple
 
 import numpy as np
 
-from memscal.model.arrays import FloatArray, keyword_array_record
+from memscal.model.arrays import FloatArray, Values, keyword_array_record
 from memscal.model.checks import Message
 from memscal.model.result import Shown
 
@@ -13,6 +15,16 @@ from memscal.model.result import Shown
 _ROBUST_LIMIT = 5.0
 _FEW_VALUES = 8.0
 _TO_SIGMA = 1.4826  # of a normal law's median absolute deviation
+SUMMARISED = {"A": "conversion_constant", "sigma": "gaussian_sigma"}
+"""What is summarised, by its symbol."""
+
+
+class Failure(NamedTuple):
+    """Class of the error of a scan that was not calibrated, what was wrong, and what to do."""
+
+    error_class: str
+    problem: str
+    cure: str
 
 
 @keyword_array_record
@@ -20,12 +32,13 @@ class FleetResults(Shown):
     """Sensors in the order of their batch; arrays have NaN where a scan has an error.
 
     ``conversion_constant`` is in ``unit``, ``gaussian_sigma`` and the places on a wafer are in mm,
-    as in the files; ``failed`` has the names of the checks that failed, ``errors`` class and words
-    of errors, both by the number of the sensor; ``name`` is that of the folder of results.
-    ``messages`` say what is missing, mixed, repeated or overridden.
+    as in the files; ``failed`` has the names of the checks that failed, ``errors`` the errors, both
+    by the number of the sensor; ``name`` is that of the folder of results.  ``messages`` say what
+    is missing, mixed, repeated or overridden, ``provenance`` how the batch was calibrated.
     """
 
     paths: Sequence[str]
+    sensors: Sequence[str]
     conversion_constant: FloatArray
     conversion_constant_errors: FloatArray
     gaussian_sigma: FloatArray
@@ -33,10 +46,21 @@ class FleetResults(Shown):
     wafer_x: FloatArray
     wafer_y: FloatArray
     failed: Mapping[int, tuple[str, ...]]
-    errors: Mapping[int, tuple[str, str]]
+    errors: Mapping[int, Failure]
     unit: str
     name: str = "sensors"
     messages: tuple[Message, ...] = ()
+    provenance: Values = field(default_factory=dict)
+
+    def unit_of(self, symbol: str) -> str:
+        """Return the unit of A or sigma."""
+        return self.unit if symbol == "A" else "mm"
+
+
+def median(values: FloatArray) -> float:
+    """Return the median of what is known, NaN of no values."""
+    known = values[np.isfinite(values)]
+    return float(np.median(known)) if known.size else float("nan")
 
 
 def robust_limit(count: int) -> float:
@@ -46,7 +70,5 @@ def robust_limit(count: int) -> float:
 
 
 def robust_spread(values: FloatArray) -> float:
-    """Return the scaled median absolute deviation, NaN of no values."""
-    if not values.size:
-        return float("nan")
-    return _TO_SIGMA * float(np.median(np.abs(values - np.median(values))))
+    """Return the scaled median absolute deviation of what is known, NaN of no values."""
+    return _TO_SIGMA * median(np.abs(values - median(values)))

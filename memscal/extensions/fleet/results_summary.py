@@ -1,19 +1,30 @@
 """Results of a fleet of sensors as tables and a mapping: distributions, outliers, failures."""
 
+import re
 from collections import Counter
+from collections.abc import Mapping
+from functools import lru_cache
+from pathlib import PurePath
 
 import numpy as np
 
-from memscal.extensions.fleet.results import FleetResults, robust_limit, robust_spread
+from memscal.extensions.fleet.results import SUMMARISED, FleetResults, median, robust_spread
+from memscal.extensions.fleet.wafer import FEWEST, deviations, trend
 from memscal.model.arrays import Values
 from memscal.model.notation import format_measured
-from memscal.summaries.table import Table, finite, texts_of
+from memscal.summaries.table import Table, finite, stated_text, texts_of
 
 Counts = dict[str, int]
 """Numbers of sensors, by what they are counted by."""
 
 _MOST_ROWS = 50
-_VALUES = {"conversion_constant": "A", "gaussian_sigma": "sigma"}
+#: What outliers are told from, in words.
+_CENTRES = {
+    "trend": "the wafer's smooth trend (quadratic in x and y)",
+    "median": f"the median (a trend takes {FEWEST} calibrated sensors with their places)",
+}
+#: What errors of one kind differ in: words with digits, which are numbers and most names.
+_PARTICULARS = re.compile(r"\S*\d\S*")
 
 
 def counts(fleet: FleetResults) -> Counts:
@@ -39,38 +50,38 @@ def failures(fleet: FleetResults) -> Counts:
     return dict(Counter(c for checks in fleet.failed.values() for c in checks).most_common())
 
 
-def error_classes(fleet: FleetResults) -> Counts:
-    """Return how many scans were not calibrated, by the class of the error."""
-    return dict(Counter(kind for kind, _ in fleet.errors.values()).most_common())
+def _error_groups(fleet: FleetResults) -> list[Values]:
+    """Return the errors that agree in class and first sentence, the most frequent first."""
+    groups: dict[tuple[str, str], list[int]] = {}
+    for i, error in fleet.errors.items():
+        sentence = error.problem.partition(". ")[0].replace(PurePath(fleet.paths[i]).name, "")
+        groups.setdefault((error.error_class, _PARTICULARS.sub("", sentence)), []).append(i)
+    return [
+        {"scans": len(some), "first": fleet.paths[some[0]], **fleet.errors[some[0]]._asdict()}
+        for some in sorted(groups.values(), key=len, reverse=True)
+    ]
 
 
-def _limit(fleet: FleetResults) -> float:
-    return robust_limit(np.isfinite(fleet.conversion_constant).sum())
+def _centre(fleet: FleetResults) -> str:
+    """Return what outliers are told from: the trend, if there is one, or the median."""
+    smooth = trend(fleet, fleet.conversion_constant)
+    return "trend" if np.isfinite(smooth).any() else "median"
 
 
+@lru_cache(maxsize=1)
 def outliers(fleet: FleetResults) -> dict[int, str]:
-    """Return sensors far from the median or with a failed check, the farthest first, and why."""
-    deviations = {}
-    for name, symbol in _VALUES.items():
-        values = getattr(fleet, name)
-        known = values[np.isfinite(values)]
-        if not known.size:
-            deviations[symbol] = np.zeros(values.size)
-            continue
-        # Where most values are the same, others are as far as their uncertainty says.
-        spread = robust_spread(known) or np.nanmedian(getattr(fleet, f"{name}_errors"))
-        deviations[symbol] = np.nan_to_num((values - np.median(known)) / (spread or 1.0))
-    farthest = np.max([np.abs(z) for z in deviations.values()], axis=0)
-    limit = _limit(fleet)
-    chosen = set(np.flatnonzero(farthest > limit).tolist())
-    chosen |= fleet.failed.keys() - fleet.errors.keys()
+    """Return sensors that are far off or have a failed check, the farthest first, and why."""
+    found = {symbol: deviations(fleet, name) for symbol, name in SUMMARISED.items()}
+    farthest = np.max(np.abs(list(found.values())), axis=0)
+    chosen = set(np.flatnonzero(farthest).tolist()) | (fleet.failed.keys() - fleet.errors.keys())
+    centre = _centre(fleet)
     reasons = {}
     for i in sorted(chosen, key=lambda i: (-farthest[i], i)):
         texts = []
-        for symbol, z in deviations.items():
+        for symbol, z in found.items():
             side = "above" if z[i] > 0 else "below"
-            if abs(z[i]) > limit:
-                texts.append(f"{symbol} {abs(z[i]):.1f} deviations {side} the median")
+            if z[i]:
+                texts.append(f"{symbol} {abs(z[i]):.1f} deviations {side} the {centre}")
         if i in fleet.failed:
             texts.append("failed " + ", ".join(fleet.failed[i]).replace("_", " "))
         reasons[i] = "; ".join(texts)
@@ -78,24 +89,29 @@ def outliers(fleet: FleetResults) -> dict[int, str]:
 
 
 def tables(fleet: FleetResults) -> list[Table]:
-    """Return counts and distributions, failed checks, errors, and the farthest outliers."""
-    limit = f"{_limit(fleet):.2g} robust deviations from the median, or a failed check"
-    title = f"Outliers: beyond {limit}"
+    """Return counts, distributions, failures, outliers, and how it was calibrated."""
+    far = "Outliers: beyond 5 robust deviations (more of few sensors) and u from"
+    title = f"{far} {_CENTRES[_centre(fleet)]}, or a failed check"
     reasons = outliers(fleet)
     further = len(reasons) - _MOST_ROWS
     if further > 0:
         title += f" ({further} further ones are in the tables)"
     outlying = []
     for i, reason in list(reasons.items())[:_MOST_ROWS]:
-        a = format_measured(fleet.conversion_constant[i], fleet.conversion_constant_errors[i])
-        sigma = format_measured(fleet.gaussian_sigma[i], fleet.gaussian_sigma_errors[i])
-        outlying.append((fleet.paths[i], a, sigma, reason))
+        values = [
+            format_measured(getattr(fleet, name)[i], getattr(fleet, f"{name}_errors")[i])
+            for name in SUMMARISED.values()
+        ]
+        outlying.append((fleet.sensors[i], fleet.paths[i], *values, reason))
+    errors = [tuple(map(str, group.values())) for group in _error_groups(fleet)]
+    made = [(key.replace("_", " "), stated_text(text)) for key, text in fleet.provenance.items()]
     return [
         Table("Sensors", ("", "number", "share"), _shares(fleet, counts(fleet))),
-        _distributions(fleet),
+        _by_symbol("Distributions", {key: _distribution(fleet, key) for key in SUMMARISED}),
         Table("Failed checks", ("check", "sensors", "share"), _shares(fleet, failures(fleet))),
-        _errors_table(fleet),
-        Table(title, ("scan", f"A ({fleet.unit})", "sigma (mm)", "reason"), outlying),
+        Table("Not calibrated", ("scans", "the first", "error", "problem", "cure"), errors),
+        Table(title, ("sensor", "scan", f"A ({fleet.unit})", "sigma (mm)", "reason"), outlying),
+        Table("How the sensors were calibrated", ("", ""), made),
     ]
 
 
@@ -105,52 +121,48 @@ def _shares(fleet: FleetResults, numbers: Counts) -> list[tuple[str, str, str]]:
     return [(name.replace("_", " "), str(n), f"{n / total:.2%}") for name, n in numbers.items()]
 
 
-def _distributions(fleet: FleetResults) -> Table:
+def _by_symbol(title: str, found: Mapping[str, Values]) -> Table:
+    """Return a row of numbers for each of A and sigma that has them."""
     rows = []
-    heads = []
-    for name, symbol in _VALUES.items():
-        distribution = _distribution(fleet, name)
-        unit, *numbers = distribution.values()
-        heads = [key.replace("_", " ") for key in distribution if key != "unit"]
+    heads: list[str] = []
+    for symbol, (unit, *numbers) in zip(found, map(dict.values, found.values()), strict=True):
+        heads = [key.replace("_", " ") for key in found[symbol] if key != "unit"]
         if numbers[0] is not None:
             rows.append((f"{symbol} ({unit})", *(f"{number:.4g}" for number in numbers)))
-    return Table("Distributions", ("", *heads), rows)
-
-
-def _errors_table(fleet: FleetResults) -> Table:
-    first = {kind: i for i, (kind, _) in reversed(list(fleet.errors.items()))}
-    rows = []
-    for kind, number in error_classes(fleet).items():
-        text = fleet.errors[first[kind]][1].partition("\n")[0]
-        rows.append((kind, str(number), fleet.paths[first[kind]], text))
-    return Table("Not calibrated", ("error", "scans", "the first of them", "its error"), rows)
+    return Table(title, ("", *heads), rows)
 
 
 def mapping(fleet: FleetResults) -> Values:
-    """Return counts, distributions, failed checks, errors, and the farthest outliers."""
-    listed = [{"path": fleet.paths[i], "reason": text} for i, text in outliers(fleet).items()]
+    """Return counts, distributions, failures, the farthest outliers, provenance."""
+    listed = [
+        {"path": fleet.paths[i], "sensor": fleet.sensors[i], "reason": text}
+        for i, text in list(outliers(fleet).items())[:_MOST_ROWS]
+    ]
     return {
         **counts(fleet),
         "checks": failures(fleet),
-        **{name: _distribution(fleet, name) for name in _VALUES},
+        **{name: _distribution(fleet, symbol) for symbol, name in SUMMARISED.items()},
         "warnings": texts_of(fleet.messages),
-        "error_classes": error_classes(fleet),
-        "outliers": listed[:_MOST_ROWS],
-        "outliers_in_all": len(listed),
+        "error_classes": dict(Counter(e.error_class for e in fleet.errors.values())),
+        "error_groups": _error_groups(fleet),
+        "outliers": listed,
+        "outliers_in_all": len(outliers(fleet)),
+        "outliers_from": _centre(fleet),
+        "provenance": dict(fleet.provenance),
     }
 
 
-def _distribution(fleet: FleetResults, name: str) -> Values:
+def _distribution(fleet: FleetResults, symbol: str) -> Values:
     """Return median, spread and quantiles of a parameter over the sensors, in its unit."""
-    known = np.isfinite(getattr(fleet, name))
-    values = getattr(fleet, name)[known]
-    errors = getattr(fleet, f"{name}_errors")[known]
-    low, middle, high = np.quantile(values, (0.05, 0.5, 0.95)) if values.size else [np.nan] * 3
+    values = getattr(fleet, SUMMARISED[symbol])
+    known = values[np.isfinite(values)]
+    low, high = np.quantile(known, (0.05, 0.95)) if known.size else (np.nan, np.nan)
+    u = median(getattr(fleet, f"{SUMMARISED[symbol]}_errors"))
     return {
-        "unit": fleet.unit if name == "conversion_constant" else "mm",
-        "median": finite(middle),
+        "unit": fleet.unit_of(symbol),
+        "median": finite(median(values)),
         "robust_deviation": finite(robust_spread(values)),
         "quantile_05": finite(low),
         "quantile_95": finite(high),
-        "median_standard_uncertainty": finite(np.median(errors) if errors.size else np.nan),
+        "median_standard_uncertainty": finite(u),
     }

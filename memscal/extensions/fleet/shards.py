@@ -1,11 +1,11 @@
 """Files of a fleet: the manifest of its scans, and the Parquet tables of its results."""
 
 import csv
+import hashlib
 import json
 import os
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
 from glob import glob
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from memscal.errors import FormatError, InputError, MemscalError, OutputError
-from memscal.extensions.fleet.results import FleetResults
+from memscal.extensions.fleet.results import Failure, FleetResults
 from memscal.formats.files import HDF5_SUFFIXES, atomic_write_bytes, read_bytes
 from memscal.formats.tables.sheets import installed
 from memscal.model.apparatus import ApparatusData
@@ -24,7 +24,7 @@ from memscal.model.quantities import ESTIMATED, MM, PER_MM, PER_MM2, parameter_q
 from memscal.version import __version__
 
 FLEET_SCHEMA = "memscal-fleet"
-FLEET_SCHEMA_VERSION = "1.1.0"
+FLEET_SCHEMA_VERSION = "1.2.0"
 DIGEST = "memscal_shard_sha256"
 #: What states the batch, and the bytes that it may have; scans that a message names.
 _BATCH = "batch.json"
@@ -128,23 +128,8 @@ def _require_places(name: str, head: Sequence[str]) -> None:
 
 #: Those that a calibration may estimate, with columns of their own.
 _PARAMETERS = tuple(n for n in ESTIMATED if n not in ("baseline_slope", "force", "maximum"))
-_TEXTS = (
-    "path",
-    "sensor",
-    "model",
-    "serial_number",
-    "channel",
-    "start_time",
-    "calibrated_at",
-    "method",
-    "artifact",
-    "error_class",
-    "error",
-    "input_sha256",
-    "options_sha256",
-    "version",
-    "unit",
-)
+#: Types of the other columns, and units of those that have one.
+_COLUMNS = Path(__file__).with_name("columns.json")
 _CHECK = ("value", "limit", "p_value")
 
 
@@ -158,44 +143,28 @@ def arrow() -> Any:
 
 def _schema(readings: Iterable[Reading]) -> Any:
     """Return names, types and units of the columns, for sensors with readings in some units."""
-    pa = arrow()
-    single = pa.float32()
-    double = pa.float64()
-    text = pa.string()
-    source = {"quantity": text, "source": text, "errors": single}
-    check = {"name": text, "passed": pa.bool_(), **dict.fromkeys(_CHECK, single)}
-    columns = {
-        "place": pa.int64(),
-        **dict.fromkeys(_TEXTS, text),
-        "passed": pa.bool_(),
-        "wafer_x": double,
-        "wafer_y": double,
-        "resolved_wavenumber": double,
-        **dict.fromkeys(("r", "g", "g_errors", "correlation"), pa.list_(single)),
-        "correlated": pa.list_(text),
-        "checks": pa.list_(pa.struct(check)),
-        "messages": pa.list_(pa.struct({"kind": text, "text": text})),
-        "budget": pa.list_(pa.struct(source)),
-    }
-    units = {
-        "wafer_x": "mm",
-        "wafer_y": "mm",
-        "resolved_wavenumber": "rad/mm",
-        "r": "mm",
-        "g": "1/mm^2",
-        "g_errors": "1/mm^2",
-        "correlation": "1",
-    }
+    stated = json.loads(_COLUMNS.read_text(encoding="utf-8"))
     for parameter in _PARAMETERS:
-        stated = {ESTIMATED[parameter].read_in(reading).unit_text for reading in readings}
+        units = {ESTIMATED[parameter].read_in(reading).unit_text for reading in readings}
         for name in (parameter, f"{parameter}_errors"):
-            columns[name] = double
-            units[name] = " or ".join(sorted(stated))
+            stated["types"][name] = "double"
+            stated["units"][name] = " or ".join(sorted(units))
+    pa = arrow()
     fields = []
-    for name, kind in columns.items():
-        about = {"units": units[name]} if name in units else None
-        fields.append(pa.field(name, kind, metadata=about))
+    for name, kind in stated["types"].items():
+        about = {"units": stated["units"][name]} if name in stated["units"] else None
+        fields.append(pa.field(name, _type(kind), metadata=about))
     return pa.schema(fields)
+
+
+def _type(kind: Any) -> Any:
+    """Return a type by its name; a list has that of its items, a mapping those of its entries."""
+    pa = arrow()
+    if isinstance(kind, list):
+        return pa.list_(_type(kind[0]))
+    if isinstance(kind, dict):
+        return pa.struct({name: _type(item) for name, item in kind.items()})
+    return pa.type_for_alias(kind)
 
 
 def fleet_row(data: ApparatusData) -> Values:
@@ -326,110 +295,98 @@ _NUMBERS = (
     "wafer_x",
     "wafer_y",
 )
-#: What makes scans alike.
-_SETTINGS = ("options_sha256", "version", "unit", "messages", "input_sha256")
-_SUMMARISED = (
-    *_NUMBERS,
+_WORDS = (
     "path",
-    "passed",
-    "error_class",
-    "error",
-    "checks",
-    *_SETTINGS,
+    "sensor",
+    "method",
+    "calibrated_at",
+    "options_sha256",
+    "version",
+    "unit",
+    "input_sha256",
 )
+_SUMMARISED = (*_NUMBERS, *_WORDS, "passed", "error_class", "problem", "cure", "checks", "messages")
 
 
-@dataclass
-class _Statements:
-    """What the rows of a batch say beside their numbers; scans by their numbers."""
-
-    paths: list[str] = field(default_factory=list)
-    failed: dict[int, tuple[str, ...]] = field(default_factory=dict)
-    errors: dict[int, tuple[str, str]] = field(default_factory=dict)
-    units: dict[str, int] = field(default_factory=dict)  # the first scan in each
-    settings: dict[tuple[str, ...], int] = field(default_factory=dict)  # and with each setting
-    overridden: dict[int, str] = field(default_factory=dict)
-    contents: set[int] = field(default_factory=set)
-    repeated: list[int] = field(default_factory=list)
-
-    def add(self, table: Any) -> None:
-        """Add the rows of a shard."""
-        start = len(self.paths)
-        self.paths += table["path"].to_pylist()
-        for place in np.flatnonzero(~table["passed"].to_numpy().astype(bool)):
-            row = table.slice(place, 1).to_pylist()[0]
-            number = start + int(place)
-            checks = row["checks"] or ()
-            self.failed[number] = tuple(check["name"] for check in checks if not check["passed"])
-            if row["error"]:
-                self.errors[number] = (row["error_class"], row["error"])
-        columns = [table[name].to_pylist() for name in _SETTINGS]
-        for number, row in enumerate(zip(*columns, strict=True), start):
-            options, version, unit, messages, digest = row
-            self.settings.setdefault((options, version), number)
-            if unit:
-                self.units.setdefault(unit, number)
-            for message in messages or ():
-                if message["kind"] == OVERRIDE:
-                    self.overridden.setdefault(number, message["text"])
-            if digest:
-                content = int(digest[:15], 16)
-                if content in self.contents:
-                    self.repeated.append(number)
-                self.contents.add(content)
-
-    def messages(self, scans: int) -> Iterator[Message]:
-        """Yield what is missing of so many scans, mixed, repeated or overridden."""
-        if len(self.paths) < scans:
-            text = f"The batch is not finished: {len(self.paths)} of {scans} scans are done."
-            yield Message("unfinished", f"{text} memscal batch --resume does the rest.", "warning")
-        kinds = len(self.settings)
-        if kinds > 1:
-            first = ", ".join(self.paths[i] for i in self.settings.values())
-            text = f"The scans were calibrated with {kinds} different options or versions"
-            yield Message("mixed", f"{text}; the first of each: {first}.", "warning")
-        if self.repeated:
-            named = ", ".join(self.paths[i] for i in self.repeated[:_NAMED])
-            more = len(self.repeated) - _NAMED
-            tail = f" and {more} more" if more > 0 else ""
-            text = f"{len(self.repeated)} scans have the content of another one and count again"
-            yield Message("repeated", f"{text}: {named}{tail}.", "warning")
-        if self.overridden:
-            i, text = next(iter(self.overridden.items()))
-            text = f"{len(self.overridden)} scans, the first {self.paths[i]}: {text}"
-            yield Message(OVERRIDE, text, "warning")
+def _messages(table: Any, words: Mapping[str, Any], scans: int) -> Iterator[Message]:
+    """Yield what is missing of so many scans, mixed, repeated or overridden."""
+    paths = words["path"]
+    if len(paths) < scans:
+        text = f"The batch is not finished: {len(paths)} of {scans} scans are done."
+        yield Message("unfinished", f"{text} memscal batch --resume does the rest.", "warning")
+    settings = list(zip(words["options_sha256"], words["version"], strict=True))
+    firsts = sorted(map(settings.index, set(settings)))
+    if len(firsts) > 1:
+        first = ", ".join(paths[i] for i in firsts)
+        text = f"The scans were calibrated with {len(firsts)} different options or versions"
+        yield Message("mixed", f"{text}; the first of each: {first}.", "warning")
+    contents = set()
+    repeated = []
+    for path, digest in zip(paths, words["input_sha256"], strict=True):
+        if digest and digest in contents:
+            repeated.append(path)
+        contents.add(digest)
+    if repeated:
+        more = len(repeated) - _NAMED
+        tail = f" and {more} more" if more > 0 else ""
+        text = f"{len(repeated)} scans have the content of another one and count again"
+        yield Message("repeated", f"{text}: {', '.join(repeated[:_NAMED])}{tail}.", "warning")
+    overridden: dict[str, str] = {}
+    for path, messages in zip(paths, table["messages"], strict=True):
+        for message in messages.as_py() or ():
+            if message["kind"] == OVERRIDE:
+                overridden.setdefault(path, message["text"])
+    if overridden:
+        path, text = next(iter(overridden.items()))
+        text = f"{len(overridden)} scans, the first {path}: {text}"
+        yield Message(OVERRIDE, text, "warning")
 
 
 def read_fleet(results: Path) -> FleetResults:
-    """Read what a summary needs of the tables of a batch, one after the other."""
+    """Read what a summary needs of the tables of a batch."""
     shards = shard_paths(results)
     if not shards:
         raise InputError(
             f"{results} holds no results of a batch.",
             cure="Give the folder that memscal batch -o wrote.",
         )
-    statements = _Statements()
-    numbers = []
-    for shard in shards:
-        table = read_shard(shard, _SUMMARISED)
-        numbers.append([table[name].to_numpy().astype(np.float64) for name in _NUMBERS])
-        statements.add(table)
-    if len(statements.units) > 1:
-        kinds = ", ".join(
-            f"{unit} (as {statements.paths[i]})" for unit, i in statements.units.items()
-        )
+    pa = arrow()
+    table = pa.concat_tables([read_shard(shard, _SUMMARISED) for shard in shards])
+    words = {name: table[name].to_pylist() for name in _WORDS}
+    paths = words["path"]
+    units = sorted(set(words["unit"]) - {None})
+    if len(units) > 1:
+        firsts = [paths[words["unit"].index(unit)] for unit in units]
+        kinds = ", ".join(f"{unit} (as {path})" for unit, path in zip(units, firsts, strict=True))
         raise FormatError(
             f"{results} holds sensors of several kinds.",
             why=f"The conversion constants are in {kinds}.",
             cure="Run a batch for each unit of readings.",
         )
-    columns = dict(zip(_NUMBERS, np.concatenate(numbers, axis=1), strict=True))
+    failing = np.flatnonzero(~table["passed"].to_numpy().astype(bool))
+    failed = {}
+    errors = {}
+    for number, row in zip(failing.tolist(), table.take(failing).to_pylist(), strict=True):
+        checks = row["checks"] or ()
+        failed[number] = tuple(check["name"] for check in checks if not check["passed"])
+        if row["error_class"]:
+            errors[number] = Failure(row["error_class"], row["problem"], row["cure"])
+    batch = read_batch(results)
+    names = zip(words["sensor"], paths, strict=True)
     return FleetResults(
-        paths=statements.paths,
-        failed=statements.failed,
-        errors=statements.errors,
-        unit=next(iter(statements.units), ""),
+        paths=paths,
+        sensors=[sensor or os.path.basename(path) for sensor, path in names],
+        failed=failed,
+        errors=errors,
+        unit="".join(units),
         name=os.path.basename(os.path.realpath(results)),
-        messages=tuple(statements.messages(read_batch(results).get("scans", 0))),
-        **columns,
+        messages=tuple(_messages(table, words, batch.get("scans", 0))),
+        provenance={
+            "method": sorted(set(filter(None, words["method"]))),
+            "options": batch.get("options"),
+            "version": sorted(set(words["version"])),
+            "calibrated": [min(words["calibrated_at"]), max(words["calibrated_at"])],
+            "inputs_sha256": hashlib.sha256(repr(words["input_sha256"]).encode()).hexdigest(),
+        },
+        **{name: table[name].to_numpy().astype(np.float64) for name in _NUMBERS},
     )

@@ -20,9 +20,7 @@ Examples:
 @option("-o --output", FILE, metavar="FILE.html")(
     "Page to write, without other files, network or scripts.  [default: RESULTS/summary.html]"
 )
-@figure_option(
-    "Draw the distributions of A and sigma, failed checks and errors, and the map of the wafer."
-)
+@figure_option("Draw the distributions of A and sigma, and the maps of the wafer.")
 @output_options
 def command(
     results: Path, output: Path | None, figures: tuple[Path, ...], as_json: bool, force: bool
@@ -30,8 +28,9 @@ def command(
     """Summarise the results that memscal batch wrote to the folder RESULTS.
 
     Shows how A (mV/Pa) and sigma (mm) are distributed, which sensors are outliers and why (the
-    distance from the median in robust standard deviations, failed checks), how often each check
-    failed, the errors by class, and A over the wafer where the manifest gave the places.
+    distance from the wafer's smooth trend, or the median, in robust standard deviations, failed
+    checks), how often each check failed, the errors by class and first sentence, and A and sigma
+    over the wafer where the places are known.
     """
     from memscal.extensions.fleet.shards import read_fleet
 

@@ -268,6 +268,13 @@ def test_a_summary_as_json_is_that_of_the_tables(results, folder, run):
     (reason,) = [o["reason"] for o in told["outliers"] if o["path"] == f"../scans/s{LARGE:02}.h5"]
     z = (a[LARGE] - a.median()) / spread
     assert reason.startswith(f"A {z:.1f} deviations above the median")
+    provenance = told["provenance"]
+    assert provenance["method"] == ["white-noise"]
+    assert provenance["calibrated"] == sorted(provenance["calibrated"])
+    page = (folder / "page.html").read_text(encoding="utf-8")
+    assert provenance["inputs_sha256"] in page
+    assert "white-noise" in page
+    assert {"problem", "cure"} <= told["error_groups"][0].keys()
     assert json.dumps(told)
 
 
@@ -288,6 +295,7 @@ def fleet_of(a, sigma, error):
     blank = np.full(a.size, np.nan)
     return FleetResults(
         paths=["scan.h5"] * a.size,
+        sensors=["S"] * a.size,
         conversion_constant=a,
         conversion_constant_errors=errors,
         gaussian_sigma=sigma,
