@@ -78,7 +78,7 @@ def test_a_certificate_is_accessible_and_prints_on_four_sheets(reports, opened, 
     assert violations(page, axe) == {}
     page.set_viewport_size(PAPER)
     assert cut(page) == []
-    assert len(re.findall(rb"/Type\s*/Page\b", page.pdf(prefer_css_page_size=True))) == 2
+    assert len(re.findall(rb"/Type\s*/Page\b", page.pdf(prefer_css_page_size=True))) == 4
 
 
 def test_every_figure_is_drawn(reports, opened):

@@ -205,7 +205,7 @@ def certify(
         missing.append(Missing(words, f"{key} in {laboratory.name}"))
     missing += _unstated(apparatus, texts["missing"], values)
     if missing and not incomplete:
-        listed = "; ".join(f"{item.words} ({item.cure})" for item in missing)
+        listed = "; ".join(f"{item.words}: {item.cure}" for item in missing)
         raise InputError(
             f"The certificate lacks: {listed}.",
             why="A certificate states who calibrated what for whom, with what and when, and every "
@@ -218,7 +218,7 @@ def certify(
     artifact = tree_to_bytes(artifact_tree(apparatus.compact()))
     derived = apparatus.content_digest[:_NUMBER_DIGITS].upper()
     stated = sections["laboratory"]
-    decided = _conformity(certified, sections["decision"], laboratory.name)
+    decision = {} if missing else sections["decision"]
     return Certificate(
         number=stated.get("number") or stated.get("prefix", "") + derived,
         issued=timestamp()[:10],
@@ -230,7 +230,7 @@ def certify(
         others=(other,) if other else (),
         undetermined=tuple(value for value in values.values() if not value.determined),
         profile=_profile(apparatus),
-        conformity=() if missing else tuple(decided),
+        conformity=tuple(_conformity(certified, decision, laboratory.name)),
         missing=tuple(missing),
         artifact=artifact if len(artifact) <= _MOST_EMBEDDED else b"",
     )

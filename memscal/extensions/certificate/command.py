@@ -70,7 +70,7 @@ def command(
                 made[".pdf"] = certificate_pdf(page, made[".xml"])
     out.write_files({path: made[path.suffix.lower()] for path in outputs}, force=force)
     result = {"number": certificate.number, "issued": certificate.issued}
-    lacking = [f"{item.words} ({item.cure})" for item in certificate.missing]
+    lacking = [f"{item.words}: {item.cure}" for item in certificate.missing]
     if as_json:
         decided = [
             {

@@ -178,7 +178,7 @@ def missing_keys(sections: Mapping[str, Section], equipment: Sequence[Section]) 
     for i, item in enumerate(equipment, start=1):
         yield from _missing(f"[[equipment]] {i}", "equipment", item)
     if not any(item.get("kind") == "load cell" for item in equipment):
-        yield '[[equipment]] of kind = "load cell" (what gave the load)'
+        yield '[[equipment]] of kind = "load cell"'
 
 
 def _missing(place: str, section: str, stated: Section) -> Iterator[str]:

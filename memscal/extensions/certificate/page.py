@@ -84,7 +84,7 @@ def certificate_pdf(page: Page, xml: bytes) -> bytes:
     made: bytes = typst.compile(
         _TYPST,
         format="pdf",
-        pdf_standards="a-3a",
+        pdf_standards=["a-3a", "ua-1"],
         sys_inputs={"contents": json.dumps(contents), "xml": xml.decode("utf-8")},
         font_paths=[Path(mpl.get_data_path(), "fonts", "ttf")],
         ignore_system_fonts=True,

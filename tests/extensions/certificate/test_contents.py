@@ -43,8 +43,8 @@ def test_all_that_is_not_stated_is_named_in_one_list_with_its_cure(apparatus, la
     with pytest.raises(InputError) as refusal:
         certify(lacking, stating(laboratory, "person", role=None))
     names = ("gain", "position-scale", "load", "thickness", "radius")
-    cures = [f"(memscal import --{name}-uncertainty)" for name in names]
-    cures += ["(memscal explain symmetry)", "([person] role in lab.toml)"]
+    cures = [f": memscal import --{name}-uncertainty" for name in names]
+    cures += [": memscal explain symmetry", ": [person] role in lab.toml"]
     assert [cure for cure in cures if cure not in refusal.value.problem] == []
     made = certify(lacking, laboratory, incomplete=True)
     assert (len(made.missing), made.conformity) == (6, ())
@@ -69,7 +69,7 @@ def test_one_mandatory_field_that_is_missing_is_named_alone(apparatus, laborator
     with pytest.raises(InputError) as refusal:
         certify(apparatus, changed)
     assert refusal.value.problem.startswith("The certificate lacks: ")
-    assert refusal.value.problem.endswith(f"({place} {key} in lab.toml).")
+    assert refusal.value.problem.endswith(f": {place} {key} in lab.toml.")
     assert ";" not in refusal.value.problem
 
 

@@ -1,13 +1,11 @@
 """The XML of a certificate: a Digital Calibration Certificate that says what the artifact says."""
 
 import base64
-import os
 from dataclasses import replace
 from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
-from dcclib.validation import SchematronValidator, XsdValidator
 from dsi_unit import DsiUnit
 
 import memscal
@@ -21,7 +19,6 @@ from memscal.model.quantities import PER_MM2
 pytestmark = pytest.mark.filterwarnings("ignore:The dsi string contains the token")
 
 NAMES = {"dcc": "https://ptb.de/dcc", "si": "https://ptb.de/si"}
-SCHEMA = os.environ.get("MEMSCAL_DCC_SCHEMA", "")
 
 
 @pytest.fixture(scope="module")
@@ -34,23 +31,6 @@ def root(xml):
     return ET.fromstring(xml)
 
 
-@pytest.fixture(scope="module")
-def others(apparatus, laboratory):
-    """Certificates with little, accredited, of a tolerance not met; and one that is incomplete."""
-    few = {
-        name: {k: v for k, v in section.items() if k not in ("street", "post_code", "email")}
-        for name, section in laboratory.sections.items()
-    }
-    few["laboratory"]["accreditation"] = "body X"
-    few["decision"]["conversion_constant"] = {"lower": 2.0, "unit": "V/MPa"}
-    plain = {name: section for name, section in few.items() if name != "decision"}
-    scan = replace(memscal.simulate(seed=1), unit="A", sensor=memscal.StressSensor())
-    made = [(apparatus, few), (memscal.calibrate(scan).apparatus, plain)]
-    certificates = [certify(a, replace(laboratory, sections=s), incomplete=True) for a, s in made]
-    assert [len(c.missing) > 0 for c in certificates] == [False, True]
-    return [certificate_xml(c) for c in certificates]
-
-
 def found(root, path):
     element = root.find(path, NAMES)
     assert element is not None, path
@@ -59,31 +39,6 @@ def found(root, path):
 
 def numbers(root, path):
     return np.array([float(text) for text in (found(root, path).text or "").split()])
-
-
-def test_ptb_s_schematron_finds_no_error(xml, others):
-    judge = SchematronValidator.for_dcc()
-    for made in (xml, *others):
-        said = judge.validate_str(made.decode())
-        assert [item.text for item in said.failed_assertions] == []
-        # Its reports of role "error" do not count for it; its warning of a list of units of which
-        # all are equal is given for any list of units.
-        assert [item.text for item in said.successful_reports if item.role == "error"] == []
-        warnings = {item.text for item in said.successful_reports if item.role == "warning"}
-        assert all("unit" in text for text in warnings)
-
-
-NO_SCHEMA = (
-    "No package brings the schema, which its authors serve over the network alone: set "
-    "MEMSCAL_DCC_SCHEMA to the path of dcc.xsd 3.3.0, with what it imports beside it."
-)
-
-
-@pytest.mark.skipif(not SCHEMA, reason=NO_SCHEMA)
-def test_it_is_valid_by_the_schema(xml, others):
-    judge = XsdValidator.from_file(SCHEMA)
-    for made in (xml, *others):
-        assert [error.message for error in judge.validate_str(made.decode()).errors] == []
 
 
 @pytest.mark.parametrize(
