@@ -66,6 +66,7 @@ VIEWS = {
 """Class of a result: the module with its tables, and the function that draws it."""
 
 HOOKS = {
+    "drawn_as": "figures.style",
     "html_image": "figures.report",
     "html_report": "figures.report",
     "atomic_write_bytes": "formats.files",

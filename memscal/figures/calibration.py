@@ -3,6 +3,7 @@
 import math
 import textwrap
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -14,18 +15,14 @@ from matplotlib.gridspec import SubplotSpec
 from memscal.axisymmetry.kernels import gaussian_transfer, unit_gaussian
 from memscal.figures.calibration_scan import (
     MOST_PANELS,
-    Loads,
     draw_residuals,
     draw_scan_log,
     draw_scans,
-    points_by_load,
-    some_points,
     standardised,
 )
 from memscal.figures.style import (
     ALONG_RADIUS,
     DECONVOLVED,
-    EXPANDED,
     FAILED,
     FIGURE_WIDTH,
     GAUSSIAN,
@@ -34,8 +31,10 @@ from memscal.figures.style import (
     REFERENCE,
     WINDOW,
     channel_indices,
+    coverage,
     draw_band,
     drawable,
+    drawn_as,
     house_style,
     legend_above,
     new_figure,
@@ -46,14 +45,20 @@ from memscal.model.apparatus import ApparatusData, ApparatusRadial, Reconvolutio
 from memscal.model.arrays import FloatArray, Values
 from memscal.model.quantities import ESTIMATED, KPA, MM, PER_MM, PER_MM2, measured_text
 from memscal.readings.find_places import even_lattice
-from memscal.summaries.calibration import Calibrated, apparatus_of, sensor_name
+from memscal.summaries.calibration import (
+    Calibrated,
+    Loads,
+    apparatus_of,
+    points_by_load,
+    sensor_name,
+    some_points,
+)
 from memscal.summaries.table import verdict
 
 _Line = tuple[str, str, str]  # text, colour and weight
 _MOST_DRAWN = 5_000  # points of lines
 _FINE = 401  # points of the curves of G and its transform
 _LOG_DECADES = 4.0
-_BAND = "±2u (conservative)"
 
 
 def draw_radial(axes: Axes, data: ApparatusData) -> None:
@@ -61,7 +66,7 @@ def draw_radial(axes: Axes, data: ApparatusData) -> None:
     radial = data.radial_profile
     axes.axhline(0.0, color="0.4", lw=0.6)
     _draw_profiles(axes, data, floor=-np.inf)
-    band = EXPANDED * radial.g_errors
+    band = coverage() * radial.g_errors
     peak = _peak(radial)
     # The band may be much larger than G, which must stay legible in it.
     top = min(_largest(radial.g + band), 3 * peak)
@@ -72,13 +77,7 @@ def draw_radial(axes: Axes, data: ApparatusData) -> None:
 
 def radial_figure(data: ApparatusData) -> Figure:
     """Draw G(r) alone, half a page wide, as a certificate shows it."""
-    with house_style():
-        figure = new_figure(2.4)
-        figure.set_figwidth(FIGURE_WIDTH / 2)
-        axes = figure.subplots()
-        draw_radial(axes, data)
-        axes.set_xlabel("distance from the axis $r$ (mm)")
-    return figure
+    return drawn_as(partial(calibration_figure, data), (FIGURE_WIDTH / 2, 2.4), 2.0, ["radial"], ())
 
 
 def draw_radial_log(axes: Axes, data: ApparatusData) -> None:
@@ -102,9 +101,11 @@ def draw_transfer(axes: Axes, data: ApparatusData) -> None:
     if 0 < limit < np.inf:
         end = min(end, 2.0 * limit)
     k = np.linspace(0.0, end, _FINE)
-    samples = np.stack([transfer.modulus, EXPANDED * transfer.modulus_errors, transfer.window])
+    samples = np.stack([transfer.modulus, coverage() * transfer.modulus_errors, transfer.window])
     modulus, band, window = on_axis(transfer.k, samples, k * PER_MM)
-    draw_band(axes, k, np.maximum(modulus - band, 0.0), modulus + band, _BAND)
+    draw_band(
+        axes, k, np.maximum(modulus - band, 0.0), modulus + band, f"±{coverage():g}u (conservative)"
+    )
     axes.plot(k, np.maximum(modulus, 0.0), color=DECONVOLVED, label="modulus for G")
     gaussian = gaussian_transfer(k * PER_MM, data.gaussian_sigma)
     axes.plot(k, gaussian, "--", color=GAUSSIAN, label="Gaussian")
@@ -125,10 +126,10 @@ def _draw_profiles(axes: Axes, data: ApparatusData, *, floor: float) -> None:
     radial = data.radial_profile
     end = _shown_radius(radial)
     r = np.linspace(0.0, end, _FINE)
-    g, band = on_axis(radial.r, np.stack([radial.g, EXPANDED * radial.g_errors]), r)
+    g, band = on_axis(radial.r, np.stack([radial.g, coverage() * radial.g_errors]), r)
     profiles = np.stack([g - band, g + band, g, unit_gaussian(r, data.gaussian_sigma)])
     low, high, g, gaussian = np.maximum(profiles, floor) / PER_MM2
-    draw_band(axes, r / MM, low, high, _BAND)
+    draw_band(axes, r / MM, low, high, f"±{coverage():g}u (conservative)")
     axes.plot(r / MM, g, color=DECONVOLVED, label="deconvolved G")
     axes.plot(r / MM, gaussian, "--", color=GAUSSIAN, label="Gaussian fit")
     axes.set_xlim(0.0, end / MM)
@@ -258,7 +259,7 @@ def calibration_figure(result: Calibrated) -> Figure:
         figure = new_figure(sum(heights))
         outer = figure.add_gridspec(len(heights), 2, height_ratios=heights)
         _write_lines(figure, lines)
-        figure.add_subplot(outer[0, :]).set_axis_off()
+        figure.add_subplot(outer[0, :], label="text").set_axis_off()
         scan_panels = _draw_scan_panels(figure, outer[1, 0], data, loads)
         grid = outer[1, 1].subgridspec(3, 1)
         radial = figure.add_subplot(grid[0], label="radial")
@@ -287,7 +288,10 @@ def _draw_scan_panels(
     heights = [max(1.0, 3.0 / apart)] * apart
     grid = place.subgridspec(apart + 2, 1, height_ratios=[*heights, 1.5, 3.0])
     scan = figure.add_subplot(grid[0], label="scan")
-    scans = [scan, *(figure.add_subplot(grid[i], sharex=scan) for i in range(1, apart))]
+    scans = [
+        scan,
+        *(figure.add_subplot(grid[i], sharex=scan, label="scan") for i in range(1, apart)),
+    ]
     residuals = figure.add_subplot(grid[-2], sharex=scan, label="residuals")
     scan_log = figure.add_subplot(grid[-1], sharex=scan, label="scan_log")
     draw_scans(scans, loads)
@@ -307,7 +311,8 @@ def values_text(data: ApparatusData) -> str:
         for name in names
         if name in parameters
     ]
-    return f"{',  '.join(values)};  ±: 95 %;  bars and bands: U = 2u (k = 2)"
+    bands = f"bars and bands: U = {coverage():g}u (k = {coverage():g})"
+    return f"{',  '.join(values)};  ±: 95 %;  {bands}"
 
 
 def _text_lines(data: ApparatusData, loads: Loads) -> list[_Line]:

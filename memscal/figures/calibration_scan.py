@@ -1,25 +1,24 @@
 """Panels of a calibration's scan: voltages with both reconvolutions, and residuals."""
 
 from collections.abc import Sequence
-from dataclasses import replace
-from itertools import cycle, pairwise
+from itertools import cycle
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Rectangle
 
-from memscal.estimation.points import MINIMUM_POSITIONS, loads_differ
+from memscal.estimation.points import loads_differ
 from memscal.figures.style import (
     ALONG_RADIUS,
     DECONVOLVED,
-    EXPANDED,
     GAUSSIAN,
     MEASURED,
     MUTED,
     REFERENCE,
     SCATTER_THRESHOLD,
     channel_indices,
+    coverage,
     draw_measured,
     draw_residual_band,
     legend_above,
@@ -32,8 +31,8 @@ from memscal.model.checks import REPEAT_CENTRES
 from memscal.model.film import LINEAR
 from memscal.model.indenter import Rod
 from memscal.model.quantities import KPA, MM
+from memscal.summaries.calibration import Loads
 
-Loads = Sequence[tuple[str, ApparatusData]]  # each load's text and points
 _Look = tuple[str, str]  # colour and marker
 MOST_PANELS = 6
 """Loads that are drawn in panels of their own and named."""
@@ -42,7 +41,7 @@ MOST_PANELS = 6
 def _draw_scan(axes: Axes, data: ApparatusData, look: _Look) -> Any:
     """Draw the scan, and on the right-hand axis U/A in kPa; return the drawn points."""
     scan = data.reconvolution
-    label = "scan" if scan.x.size > SCATTER_THRESHOLD else "scan, ±2u"
+    label = "scan" if scan.x.size > SCATTER_THRESHOLD else f"scan, ±{coverage():g}u"
     points = _draw_measured(axes, data, scan.u_zz, look, label)
     _draw_predictions(axes, data)
     _draw_reference(axes, data)
@@ -96,7 +95,7 @@ def draw_scan_log(axes: Axes, data: ApparatusData, loads: Loads) -> None:
                 mew=0.7,
                 color=MUTED,
                 ms=0.8 * marker_size(x.size),
-                label="less than 2u: upper limit, U + 2u",
+                label=f"less than {coverage():g}u: upper limit, U + {coverage():g}u",
                 rasterized=x.size > SCATTER_THRESHOLD,
             )
         _draw_predictions(axes, part, net=True)
@@ -331,7 +330,7 @@ def _background(data: ApparatusData, x: FloatArray) -> FloatArray:
 
 def _bars(data: ApparatusData) -> FloatArray:
     """Return the expanded uncertainties of the voltages, 0 where they are not stated."""
-    return EXPANDED * np.nan_to_num(data.reconvolution.u_zz_errors, posinf=0.0)
+    return coverage() * np.nan_to_num(data.reconvolution.u_zz_errors, posinf=0.0)
 
 
 def _limit_to_scan(axes: Axes, x: FloatArray) -> None:
@@ -391,28 +390,3 @@ def standardised(scan: Reconvolution) -> tuple[FloatArray, FloatArray, str]:
         errors = np.full(errors.shape, rms if rms > 0 else 1.0)
         scale = "own rms"
     return scan.residual / errors, (scan.u_zz - scan.u_zz_gaussian) / errors, scale
-
-
-def points_by_load(data: ApparatusData) -> Loads:
-    """Return the points of each load apart, from the smallest up; of a single one without text."""
-    scan = data.reconvolution
-    if scan.load is None:
-        return [("", data)]
-    loads, inverse = np.unique(scan.load, return_inverse=True)
-    # A load that is measured with noise at each point is one load: there is no gap in it.
-    group = np.cumsum([0, *map(loads_differ, pairwise(loads))])[inverse]
-    counts = np.bincount(group)
-    if counts.size == 1 or counts.min() < MINIMUM_POSITIONS:
-        return [("", data)]
-    parts = []
-    for i in range(counts.size):
-        points = some_points(scan, group == i)
-        load = scan.load[group == i].mean()
-        parts.append((f"{load:.3g} N", replace(data, load=load, reconvolution=points)))
-    return parts
-
-
-def some_points(scan: Reconvolution, chosen: Any) -> Reconvolution:
-    """Return some points of a scan, by a mask or a slice."""
-    columns = {name: values[chosen] for name, values in vars(scan).items() if values is not None}
-    return replace(scan, **columns)

@@ -29,11 +29,12 @@ from memscal.figures.style import (
     ALONG_RADIUS,
     COVERAGE_NOTE,
     DECONVOLVED,
-    EXPANDED,
     GAUSSIAN,
     MEASURED,
     MUTED,
     REFERENCE,
+    columns_above,
+    coverage,
     legend_above,
     mark,
     panels_of,
@@ -80,7 +81,7 @@ def _draw_maxima(axes: Axes, comparison: FrictionComparison, loading: str) -> No
         measured = [at_load for at_load in compared if at_load.lubrication == lubrication]
         x = [at_load.load for at_load in measured]
         ratio = [at_load.ratio for at_load in measured]
-        bars = [EXPANDED * at_load.ratio_uncertainty for at_load in measured]
+        bars = [coverage() * at_load.ratio_uncertainty for at_load in measured]
         axes.errorbar(
             x,
             ratio,
@@ -217,10 +218,10 @@ def _draw_effective(axes: Axes, comparison: FrictionComparison, loads: Loads) ->
         axes.axhline(float(friction_position(joint.value)), color=REFERENCE, lw=0.8)
     if comparison.macroscopic is not None:
         value, u = comparison.macroscopic
-        label = "macroscopic, ±2u" if u else "macroscopic"
+        label = f"macroscopic, ±{coverage():g}u" if u else "macroscopic"
         axes.axhline(float(friction_position(value)), color=MUTED, lw=0.8, ls="--", label=label)
         if u:
-            spread = EXPANDED * u
+            spread = coverage() * u
             low, high = friction_position([max(value - spread, 0.0), value + spread])
             axes.axhspan(low, high, color=MUTED, alpha=0.15, lw=0)
     friction_axis(axes, "y")
@@ -280,7 +281,7 @@ def _panels(
         order = [label for label in first if label in entries]
         order += [label for label in entries if label not in first]
         handles = [entries[label] for label in order]
-        figure.legend(handles, order, loc="outside upper center", ncols=min(len(order), 7))
+        figure.legend(handles, order, loc="outside upper center", ncols=columns_above(len(order)))
     return figure
 
 

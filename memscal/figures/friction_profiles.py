@@ -12,10 +12,10 @@ from numpy.typing import ArrayLike
 from memscal.errors import InputError
 from memscal.figures.style import (
     ALONG_RADIUS,
-    EXPANDED,
     MEASURED,
     SCATTER_THRESHOLD,
     Looks,
+    coverage,
     draw_measured,
     draw_residual_band,
     draw_zero,
@@ -126,7 +126,7 @@ def _draw_points(
     profile = at_load.profile
     r = profile.r / MM
     s = profile.s_zz / KPA
-    bars = EXPANDED * profile.s_zz_errors / KPA
+    bars = coverage() * profile.s_zz_errors / KPA
     clear = s > bars if logarithmic else np.ones(s.size, dtype=bool)
     look = mark(at_load.lubrication, colour) | _BARS | {"many": s.size > SCATTER_THRESHOLD}
     for shown, alpha in ((clear, None), (~clear & (s > 0), _PALE)):
@@ -196,7 +196,7 @@ def draw_profiles(
         for ls, label in styles.items():
             axes.plot([], [], color="0.3", lw=1.0, ls=ls, label=label)
         pale = mark(loads[0].lubrication, "0.3") | {"ls": "none", "ms": 3.0, "alpha": 2 * _PALE}
-        axes.plot([], [], label="pale: less than 2u", **pale)
+        axes.plot([], [], label=f"pale: less than {coverage():g}u", **pale)
         legend_above(axes)
         return
     draw_zero(axes)
@@ -319,7 +319,7 @@ def _draw_set(
         curve = on_axis(profile.r, (at_load.calculated[i] - less)[None, :], r)[0]
         axes.plot(r / MM, curve / unit, color=friction_colour(comparison.friction[i]), lw=0.9)
     stress = (profile.s_zz - less) / unit
-    errors = EXPANDED * profile.s_zz_errors / unit
+    errors = coverage() * profile.s_zz_errors / unit
     many = stress.size > SCATTER_THRESHOLD
     draw_measured(axes, profile.r / MM, stress, errors, many=many, **look)
     axes.set_xlim(0, 1.03 * r[-1] / MM)

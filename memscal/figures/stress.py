@@ -12,7 +12,6 @@ from memscal.figures.style import (
     ALONG_RADIUS,
     COVERAGE_NOTE,
     DECONVOLVED,
-    EXPANDED,
     FAILED,
     GAUSSIAN,
     MEASURED,
@@ -20,6 +19,8 @@ from memscal.figures.style import (
     REFERENCE,
     SCATTER_THRESHOLD,
     along_radius,
+    columns_above,
+    coverage,
     draw_band,
     draw_measured,
     draw_residual_band,
@@ -49,7 +50,7 @@ def measured_stress_figure(measured: MeasuredStress) -> Figure:
         looks = load_looks(profile.load for profile in measured.profiles)
         for profile in measured.profiles:
             colour, _ = looks[profile.load]
-            clear = profile.s_zz > EXPANDED * profile.s_zz_errors
+            clear = profile.s_zz > coverage() * profile.s_zz_errors
             _draw(linear, profile, colour, np.ones_like(clear))
             _draw(logarithmic, profile, colour, clear)
         for axes in panels:
@@ -57,7 +58,9 @@ def measured_stress_figure(measured: MeasuredStress) -> Figure:
             axes.set_xlim(left=0.0)
         linear.set_title("linear scale", fontsize=8, loc="left")
         draw_zero(linear)
-        logarithmic.set_title("logarithmic scale; pale: less than 2u", fontsize=8, loc="left")
+        logarithmic.set_title(
+            f"logarithmic scale; pale: less than {coverage():g}u", fontsize=8, loc="left"
+        )
         top = max(profile.s_zz.max() for profile in measured.profiles) / KPA
         logarithmic.set_yscale("log")
         logarithmic.set_ylim(_DECADES * top, 1.6 * top)
@@ -72,12 +75,14 @@ def measured_stress_figure(measured: MeasuredStress) -> Figure:
             if many:
                 look["marker"] = "."
             else:
-                words += ", ±2u"
+                words += f", ±{coverage():g}u"
             dashes = "--" if state == "lubricated" else "-"
             handles.append(Line2D([], [], lw=0.8, ms=3.2, ls=dashes, label=words, **look))
         label = "contact radius, µ = 0"
         handles.append(Line2D([], [], color="0.2", marker="|", ms=6, ls="none", label=label))
-        figure.legend(handles=handles, loc="outside upper center", ncols=min(len(handles), 7))
+        figure.legend(
+            handles=handles, loc="outside upper center", ncols=columns_above(len(handles))
+        )
     return figure
 
 
@@ -95,7 +100,7 @@ def _draw(axes: Axes, profile: MeasuredProfile, colour: str, clear: BoolArray) -
     }
     r = profile.r / MM
     stress = profile.s_zz / KPA
-    bars = EXPANDED * profile.s_zz_errors / KPA
+    bars = coverage() * profile.s_zz_errors / KPA
     draw_measured(axes, r[clear], stress[clear], bars[clear], **look)
     if not clear.all():
         draw_measured(axes, r[~clear], stress[~clear], None, alpha=0.3, **look)
@@ -116,9 +121,9 @@ def restoration_figure(restored: Restoration) -> Figure:
 def _draw_stress(axes: Axes, restored: Restoration) -> None:
     r = restored.r / MM
     stress = restored.sigma_zz / KPA
-    band = EXPANDED * np.sqrt(np.maximum(np.diag(restored.covariance), 0.0)) / KPA
+    band = coverage() * np.sqrt(np.maximum(np.diag(restored.covariance), 0.0)) / KPA
     draw_band(axes, r, stress - band, stress + band)
-    axes.plot(r, stress, color=DECONVOLVED, label=r"restored $\sigma_{zz}$, ±2u")
+    axes.plot(r, stress, color=DECONVOLVED, label=rf"restored $\sigma_{{zz}}$, ±{coverage():g}u")
     blurred = restored.blurred_stress(restored.r) / KPA
     label = r"blurred again, $S_{zz} = G*\sigma_{zz}$"
     axes.plot(r, blurred, color=GAUSSIAN, ls="-.", label=label)

@@ -1,14 +1,17 @@
 """Style of all figures: type, colours, layout, and the bytes of a figure's file."""
 
 import io
-from collections.abc import Iterable, Iterator, Mapping
+import textwrap
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from contextvars import ContextVar
 from pathlib import Path
 from string import ascii_lowercase
 from typing import Any
 
 import matplotlib as mpl
 import numpy as np
+from matplotlib import style as styles
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -18,7 +21,7 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 from numpy.typing import NDArray
 
 from memscal.axisymmetry.hankel import radial_spline
-from memscal.errors import InputError
+from memscal.errors import InputError, require_names
 from memscal.estimation.points import TANGENTIAL
 from memscal.figures import FIGURE_SUFFIXES
 from memscal.model.apparatus import ApparatusData
@@ -31,11 +34,8 @@ def channel_indices(data: ApparatusData) -> str:
     return data.sensor.channel if data.sensor.channel in TANGENTIAL else "zz"
 
 
-EXPANDED = 2.0
-"""Coverage factor of every error bar, band and limit in every figure."""
-
-COVERAGE_NOTE = f"Error bars and bands: expanded uncertainty U = {EXPANDED:g}u (k = {EXPANDED:g})."
-"""What a figure with uncertainties states below its panels."""
+COVERAGE_NOTE = "Error bars and bands: expanded uncertainty U = {0:g}u (k = {0:g})."
+"""What a figure with uncertainties states below its panels, of its coverage factor."""
 
 ALONG_RADIUS = "distance from the axis $r$ (mm)"
 """Label of the axis along which profiles are drawn."""
@@ -70,6 +70,59 @@ _LUBRICATIONS = {"dry": ("o", True), "lubricated": ("s", False), "": ("D", True)
 _STYLE = Path(__file__).with_name("house.mplstyle")
 
 
+#: Coverage factor, the user's style on top of ours, and whether all panels are drawn, with letters.
+_LOOK = ContextVar[tuple[float, Any, bool]]("look", default=(2.0, (), True))
+
+
+class HouseFigure(Figure):
+    """A figure that a notebook shows at the end of a cell."""
+
+    def _repr_png_(self) -> bytes:
+        return render_figure(self, "png", dpi=100.0)
+
+
+def coverage() -> float:
+    """Return the coverage factor of every error bar, band and limit in a figure."""
+    return _LOOK.get()[0]
+
+
+def drawn_as(
+    draw: Callable[[], Figure],
+    figsize: tuple[float, float] | None,
+    k: float,
+    panels: Sequence[str],
+    style: Any,
+) -> Figure:
+    """Draw a figure with a coverage factor and a style, of a size in inches, or some panels."""
+    token = _LOOK.set((k, style, not panels))
+    try:
+        figure = draw()
+        if figsize:
+            figure.set_size_inches(figsize)
+        if panels:
+            _keep_panels(figure, panels)
+        return figure
+    finally:
+        _LOOK.reset(token)
+
+
+def _keep_panels(figure: Figure, names: Sequence[str]) -> None:
+    """Keep panels alone, below each other, each with labels of its own."""
+    panels = figure.axes
+    require_names("The figure has no panel", names, [str(axes.get_label()) for axes in panels])
+    kept = [axes for axes in panels if axes.get_label() in names]
+    grid = figure.add_gridspec(len(kept))
+    for i, axes in enumerate(kept):
+        siblings = axes.get_shared_x_axes().get_siblings(axes)
+        label = max((other.get_xlabel() for other in siblings), key=len)
+        axes.set(xlabel=label, ylabel=textwrap.fill(axes.get_ylabel(), 34))
+        axes.tick_params(labelbottom=True, labelleft=True)
+        axes.set_subplotspec(grid[i])
+    for artist in {*panels, *figure.texts} - {*kept}:
+        artist.remove()
+    figure.set_layout_engine("constrained")
+
+
 @contextmanager
 def house_style() -> Iterator[None]:
     """Set matplotlib's settings to the house's, not the user's, and restore them after."""
@@ -77,6 +130,7 @@ def house_style() -> Iterator[None]:
     with mpl.rc_context():
         mpl.rcdefaults()
         mpl.rcParams.update(mpl.rc_params_from_file(_STYLE, use_default_template=False))
+        styles.use(_LOOK.get()[1])
         yield
 
 
@@ -93,10 +147,10 @@ def new_figure(height: float, note: str = "") -> Figure:
     layout = ConstrainedLayoutEngine(
         w_pad=0.05, h_pad=0.04, wspace=0.04, hspace=0.02, rect=(0.0, share, 1.0, 1.0 - share)
     )
-    figure = Figure(figsize=(FIGURE_WIDTH, height + room), layout=layout)
+    figure = HouseFigure(figsize=(FIGURE_WIDTH, height + room), layout=layout)
     FigureCanvasAgg(figure)
     if note:
-        figure.text(0.01, 0.3 * share, note, color=MUTED, fontsize=7)
+        figure.text(0.01, 0.3 * share, note.format(coverage()), color=MUTED, fontsize=7)
     return figure
 
 
@@ -118,8 +172,9 @@ def panels_of(
 def panel_letters(panels: Iterable[Axes]) -> None:
     """Put each panel's letter at the upper left, outside the frame and clear of all data."""
     for axes, letter in zip(panels, ascii_lowercase, strict=False):
+        axes.set_label(axes.get_label() or letter)
         axes.annotate(
-            letter,
+            letter if _LOOK.get()[2] else "",
             (0.0, 1.0),
             (-5, 6),
             xycoords="axes fraction",
@@ -139,10 +194,15 @@ def legend_above(
         handles=sorted(handles, key=lambda handle: handle is not first),
         loc="lower left",
         bbox_to_anchor=(0.0, 1.0),
-        ncols=columns,
+        ncols=columns if _LOOK.get()[2] else 1,
         borderpad=0.2,
         markerscale=3.0 if points > SCATTER_THRESHOLD else 1.0,
     )
+
+
+def columns_above(entries: int) -> int:
+    """Return how many columns the entries of a whole figure's legend take, or of a panel's alone."""
+    return min(entries, 7 if _LOOK.get()[2] else 2)
 
 
 def shades(count: int, first: float) -> list[str]:
@@ -196,7 +256,7 @@ def draw_band(
 
 def draw_residual_band(axes: Axes) -> None:
     """Draw where residuals over their standard uncertainty are expected."""
-    axes.axhspan(-EXPANDED, EXPANDED, color="0.92", lw=0)
+    axes.axhspan(-coverage(), coverage(), color="0.92", lw=0)
     axes.axhline(0.0, color="0.4", lw=0.6)
 
 

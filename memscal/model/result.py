@@ -6,6 +6,7 @@ them, and they are imported when a method is called.
 
 from __future__ import annotations
 
+from functools import partial
 from html import escape
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +14,7 @@ from memscal import extensions
 from memscal.errors import InputError
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from os import PathLike
 
     import pandas as pd
@@ -26,10 +28,35 @@ _IN_A_NOTEBOOK = 100.0
 class Drawn:
     """A result that draws itself, by the function that stands beside its class."""
 
-    def plot(self, **options: Any) -> Figure:
-        """Draw the result; the figure is returned, and nothing is shown or written."""
+    def plot(
+        self,
+        *,
+        figsize: tuple[float, float] | None = None,
+        k: float = 2.0,
+        panels: str | Sequence[str] = (),
+        style: Any = (),
+        **options: Any,
+    ) -> Figure:
+        """Draw the result; the figure is returned, and nothing is shown or written.
+
+        Parameters
+        ----------
+        figsize : (float, float), optional
+            Width and height in inches; ``(3.15, 2.4)`` suits a panel in a column of 8 cm.
+        k : float
+            Coverage factor of bands and error bars.
+        panels : str or sequence of str
+            Panels that are drawn, alone: their letters in the whole figure or, of a calibration,
+            ``scan``, ``residuals``, ``scan_log``, ``radial``, ``radial_log``, ``transfer``.
+        style : str, mapping, or several
+            Styles of matplotlib, or its settings, on top of ours.
+        **options
+            What else the figure of this result takes.
+        """
         module, _, function = extensions.VIEWS[type(self).__name__][1].rpartition(".")
-        figure: Figure = getattr(extensions.module(module), function)(self, **options)
+        draw = partial(getattr(extensions.module(module), function), self, **options)
+        chosen = [panels] if isinstance(panels, str) else panels
+        figure: Figure = extensions.hook("drawn_as")(draw, figsize, k, chosen, style)
         return figure
 
 

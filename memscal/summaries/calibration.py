@@ -2,15 +2,20 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from memscal.calibration.calibrate import Calibration
 from memscal.calibration.explanations import DEPARTURE, explanation, misfit
 from memscal.calibration.stages import Misfit
-from memscal.estimation.points import ScanPoints
+from memscal.estimation.points import MINIMUM_POSITIONS, ScanPoints, loads_differ
 from memscal.mechanics.contact import Contact
 from memscal.model import records
-from memscal.model.apparatus import ApparatusData, ParameterSet
+from memscal.model.apparatus import ApparatusData, ParameterSet, Reconvolution
 from memscal.model.arrays import Values
 from memscal.model.assumptions import MOVED
 from memscal.model.checks import EXPLANATIONS, REPEAT_CENTRES, Message
@@ -37,6 +42,7 @@ from memscal.summaries.declared import (
 from memscal.summaries.table import Table, checks_json, checks_table, finite, texts_of, verdict
 
 Calibrated = Calibration | ApparatusData
+Loads = Sequence[tuple[str, ApparatusData]]  # each load's text and points
 
 _BY_METHOD = ("conversion_constant", "gaussian_sigma_deconvolved", "fwhm", "noise_equivalent_area")
 #: What scans tell of the film, and what explains them, where they do.
@@ -309,3 +315,28 @@ def _origin(stress: StressProfile | Contact) -> str:
     if stress.source is not None:
         return stress.source.file_name
     return "the one in the scan" + (f" ({stress.solver})" if stress.solver else "")
+
+
+def points_by_load(data: ApparatusData) -> Loads:
+    """Return the points of each load apart, from the smallest up; of a single one without text."""
+    scan = data.reconvolution
+    if scan.load is None:
+        return [("", data)]
+    loads, inverse = np.unique(scan.load, return_inverse=True)
+    # A load that is measured with noise at each point is one load: there is no gap in it.
+    group = np.cumsum([0, *map(loads_differ, pairwise(loads))])[inverse]
+    counts = np.bincount(group)
+    if counts.size == 1 or counts.min() < MINIMUM_POSITIONS:
+        return [("", data)]
+    parts = []
+    for i in range(counts.size):
+        points = some_points(scan, group == i)
+        load = scan.load[group == i].mean()
+        parts.append((f"{load:.3g} N", replace(data, load=load, reconvolution=points)))
+    return parts
+
+
+def some_points(scan: Reconvolution, chosen: Any) -> Reconvolution:
+    """Return some points of a scan, by a mask or a slice."""
+    columns = {name: values[chosen] for name, values in vars(scan).items() if values is not None}
+    return replace(scan, **columns)

@@ -9,12 +9,12 @@ from memscal.errors import InputError
 from memscal.extensions.planning.design import Design, varied_designs
 from memscal.figures.style import (
     DECONVOLVED,
-    EXPANDED,
     GAUSSIAN,
     MEASURED,
     MUTED,
     WINDOW,
     along_radius,
+    coverage,
     draw_band,
     legend_above,
     on_axis,
@@ -58,9 +58,9 @@ def design_figure(planned: Design, vary: str = "step") -> Figure:
 
 def _draw_radial(axes: Axes, planned: Design) -> None:
     r = np.linspace(0.0, _WIDTHS * planned.parameters["gaussian_sigma"], _FINE)
-    samples = np.stack([planned.g, EXPANDED * planned.g_errors])
+    samples = np.stack([planned.g, coverage() * planned.g_errors])
     g, error = on_axis(planned.r, samples, r) / PER_MM2
-    draw_band(axes, r / MM, g - error, g + error, "±2u")
+    draw_band(axes, r / MM, g - error, g + error, f"±{coverage():g}u")
     axes.plot(r / MM, g, color=DECONVOLVED, label="G expected")
     assumed = planned.plan.kernel.radial(r) / PER_MM2
     axes.plot(r / MM, assumed, color=MEASURED, ls=":", label="G assumed")
@@ -71,7 +71,7 @@ def _draw_radial(axes: Axes, planned: Design) -> None:
 def _draw_transfer(axes: Axes, planned: Design) -> None:
     resolved = planned.resolved_wavenumber
     k = np.linspace(0.0, min(_BANDS * resolved, planned.k[-1]), _FINE)
-    samples = np.stack([planned.transfer, EXPANDED * planned.transfer_errors])
+    samples = np.stack([planned.transfer, coverage() * planned.transfer_errors])
     transfer, error = on_axis(planned.k, samples, k)
     axes.axvspan(0, resolved / PER_MM, color=WINDOW, alpha=0.12, lw=0)
     axes.axvline(resolved / PER_MM, color=WINDOW, ls=":", label="resolved")
@@ -91,11 +91,16 @@ def _draw_varied(axes: Axes, planned: Design, vary: str) -> None:
         noise = np.array([varied.budget[name]["noise"] for varied in designs])
         noise /= np.abs([varied.parameters[name] for varied in designs])
         look: Values = {"color": colour, "marker": marker, "ms": 3}
-        axes.plot(along, 100 * EXPANDED * total, label=symbol, **look)
-        axes.plot(along, 100 * EXPANDED * noise, ls="--", mfc="none", **look)
+        axes.plot(along, 100 * coverage() * total, label=symbol, **look)
+        axes.plot(along, 100 * coverage() * noise, ls="--", mfc="none", **look)
     axes.plot([], [], color="0.4", ls="--", label="noise alone")
     axes.axvline(getattr(planned.plan, vary) / scale, color=MUTED, ls=":", lw=0.8)
-    axes.set(xscale="log", yscale="log", xlabel=label, ylabel="relative uncertainty, 2u (%)")
+    axes.set(
+        xscale="log",
+        yscale="log",
+        xlabel=label,
+        ylabel=f"relative uncertainty, {coverage():g}u (%)",
+    )
     # 0.5 and 20 in place of powers of ten: the axes span a decade or two.
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
