@@ -33,8 +33,8 @@ from memscal.figures.style import (
     MEASURED,
     MUTED,
     REFERENCE,
-    columns_above,
     coverage,
+    entry_columns,
     legend_above,
     mark,
     panels_of,
@@ -281,7 +281,7 @@ def _panels(
         order = [label for label in first if label in entries]
         order += [label for label in entries if label not in first]
         handles = [entries[label] for label in order]
-        figure.legend(handles, order, loc="outside upper center", ncols=columns_above(len(order)))
+        figure.legend(handles, order, loc="outside upper center", ncols=entry_columns(len(order)))
     return figure
 
 

@@ -19,12 +19,12 @@ from memscal.figures.style import (
     REFERENCE,
     SCATTER_THRESHOLD,
     along_radius,
-    columns_above,
     coverage,
     draw_band,
     draw_measured,
     draw_residual_band,
     draw_zero,
+    entry_columns,
     legend_above,
     load_looks,
     mark,
@@ -81,7 +81,7 @@ def measured_stress_figure(measured: MeasuredStress) -> Figure:
         label = "contact radius, µ = 0"
         handles.append(Line2D([], [], color="0.2", marker="|", ms=6, ls="none", label=label))
         figure.legend(
-            handles=handles, loc="outside upper center", ncols=columns_above(len(handles))
+            handles=handles, loc="outside upper center", ncols=entry_columns(len(handles))
         )
     return figure
 

@@ -200,8 +200,8 @@ def legend_above(
     )
 
 
-def columns_above(entries: int) -> int:
-    """Return how many columns the entries of a whole figure's legend take, or of a panel's alone."""
+def entry_columns(entries: int) -> int:
+    """Return how many columns the entries of a figure's legend take, or of a panel's."""
     return min(entries, 7 if _LOOK.get()[2] else 2)
 
 
