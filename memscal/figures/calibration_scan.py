@@ -106,15 +106,20 @@ def draw_scan_log(axes: Axes, data: ApparatusData, loads: Loads) -> None:
         axes.set_ylim(0.5 * shown.min(), 2.0 * shown.max())
     _draw_indenter(axes, data)
     _limit_to_scan(axes, data.reconvolution.x)
-    along = "y" if data.process.configuration.get("direction") == "y" else "x"
-    aligned = ", repeats moved to one centre" if _aligned(data) else ""
-    axes.set_xlabel(ALONG_RADIUS if _by_distance(data) else f"position ${along}$ (mm){aligned}")
+    axes.set_xlabel(position_label(data))
     bar = "|" if _tangential(data) else ""
     unit = data.reading.unit
     axes.set_ylabel(f"{bar}$U_{{{channel_indices(data)}}}$ less baseline{bar} ({unit})")
     _stress_axis(axes, data, baseline=0.0)
     handles = [*limits[:1], *named]  # the lines are those of the panel above
     axes.legend(handles=handles, loc="lower left", bbox_to_anchor=(0, 1), borderpad=0.2, ncols=2)
+
+
+def position_label(data: ApparatusData) -> str:
+    """Say along what the points of a scan are drawn, with its unit."""
+    along = "y" if data.process.configuration.get("direction") == "y" else "x"
+    aligned = ", repeats moved to one centre" if _aligned(data) else ""
+    return ALONG_RADIUS if _by_distance(data) else f"position ${along}$ (mm){aligned}"
 
 
 def _signal_and_limit(data: ApparatusData) -> ArrayPair:

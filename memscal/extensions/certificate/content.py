@@ -13,7 +13,7 @@ from memscal.apparatus import ApparatusFunction
 from memscal.extensions.certificate.certificate import COVERAGE_FACTOR, Certificate, CertifiedValue
 from memscal.extensions.certificate.laboratory import MEASURED_BY, ZERO_CELSIUS
 from memscal.figures.calibration import radial_figure
-from memscal.figures.calibration_scan import draw_residuals, draw_scans
+from memscal.figures.calibration_scan import draw_residuals, draw_scans, position_label
 from memscal.figures.report import Picture
 from memscal.figures.style import FIGURE_WIDTH, house_style, new_figure
 from memscal.model.assumptions import ASSUMED, MEASURED
@@ -326,7 +326,7 @@ def scan_figure(apparatus: ApparatusFunction) -> Figure:
         loads = [("", apparatus)]
         draw_scans([scan], loads)
         draw_residuals(residuals, apparatus, loads)
-        residuals.set_xlabel("position $x$ (mm)")
+        residuals.set_xlabel(position_label(apparatus))
     return figure
 
 
