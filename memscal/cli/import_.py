@@ -137,7 +137,7 @@ _NEEDED_WITH_MESH = ("r_unit", "sigma_unit")
 @option("--die-pitch", click.FloatRange(0, min_open=True), nargs=2, metavar="MM MM")(
     "Scan: distance of columns and of rows on the wafer, in mm.  [default: places count dies]"
 )
-@option("--resume", is_flag=True)("Several tables: keep the scans that are there.")
+@option("--resume", is_flag=True)("Several tables: keep scans that are there, as they are.")
 @option("--dry-run", is_flag=True)(
     "Read every table, say what would be written, and write nothing."
 )

@@ -119,7 +119,7 @@ class Batch:
         """Read a scan, or a table by the recipe."""
         if self.recipe:
             return read_table(path, self.recipe)
-        return read_scan(path, accept_altered=self.options.get("accept_altered", False))
+        return read_scan(path, accept_altered=self.options["accept_altered"])
 
     def shards(self) -> Iterator[Shard]:
         """Yield the shards in their order, listing the scans as they are needed."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import ExitStack
 from functools import partial
 from operator import attrgetter
@@ -18,8 +18,6 @@ from memscal.cli.calibrate import calibration_options, calibration_settings
 from memscal.cli.failures import CHECK_FAILED, DONE, debug_option
 from memscal.cli.options import FILE, json_option, option, report_option
 from memscal.errors import MemscalError
-from memscal.formats.files import together
-from memscal.summaries.table import Table
 
 if TYPE_CHECKING:
     from memscal.extensions.fleet.batch import Batch, ShardOutcome
@@ -97,9 +95,10 @@ def command(
     if workers and scheduler:
         raise click.UsageError("--workers and --scheduler exclude each other: give one of them.")
     from memscal.extensions.fleet.batch import Batch
-    from memscal.extensions.fleet.import_tables import attempt_all
+    from memscal.extensions.fleet.import_tables import attempt_all, emit_counts
     from memscal.extensions.fleet.recipe import recipe_of
     from memscal.extensions.fleet.shards import expanded, make_folder, read_fleet, shard_paths
+    from memscal.progress import span
 
     chosen = calibration_settings(**settings)
     results = Path(os.path.realpath(results))
@@ -129,6 +128,7 @@ def command(
     errors = sum(outcome.errors for outcome in outcomes)
     failed = sum(outcome.failed for outcome in outcomes)
     kept = sum(outcome.kept for outcome in outcomes)
+    seconds = monotonic() - start
     counts = {
         "scans": total,
         "passed": total - errors - failed,
@@ -136,37 +136,19 @@ def command(
         "errors": errors,
         "shards_written": len(outcomes) - kept,
         "shards_kept": kept,
+        "time": span(seconds),
     }
-    page = dict[Path, bytes]()
-    problem = None
-    try:
-        page = {} if report is None else out.reported(read_fleet(results), report)
-    except MemscalError as failure:  # is told after what the batch has done
-        problem = failure
-    with together():
-        out.write_files(page, force=force)
-        _emit(counts, batch, monotonic() - start, as_json)
-    out.say_written([results, *page])
-    if problem:
-        raise problem
+    told = {"results": str(results), "time": {"value": round(seconds, 1), "unit": "s"}}
+    emit_counts(f"Batch of {paths[0].name}", counts, told, as_json=as_json)
+    out.say_written([results])
+    if report is not None:  # whose errors are told after what the batch has done
+        out.write_files(out.reported(read_fleet(results), report), force=force)
+        out.say_written([report])
     if not errors + failed:
         return DONE
     what = f"{errors} of {total} scans were not calibrated, {failed} failed a quality check"
     out.warn(f"{what}: memscal summary {results}")
     return CHECK_FAILED
-
-
-def _emit(counts: Mapping[str, int], batch: Batch, seconds: float, as_json: bool) -> None:
-    """Print what came of the scans."""
-    if as_json:
-        told = {"schema_version": "1", "results": str(batch.results), **counts}
-        out.emit_json(told | {"time": {"value": round(seconds, 1), "unit": "s"}})
-        return
-    from memscal.progress import span
-
-    rows = [(name.replace("_", " "), str(number)) for name, number in counts.items()]
-    rows.append(("time", span(seconds)))
-    out.emit_tables(Table(f"Batch of {batch.sources[0].name}", ("", ""), rows))
 
 
 def _outcomes(batch: Batch, workers: int | None, scheduler: str | None) -> Iterator[ShardOutcome]:

@@ -89,13 +89,26 @@ def attempt_all(
             else:
                 notes += done if isinstance(done, Sequence) else getattr(done, "messages", ())
     numbers = {**counts, "read": len(jobs) - len(refused), "refused": len(refused)}
-    if as_json:
-        problems = [{"path": name, **vars(error)} for name, error in refused.items()]
-        stated = {"problems": problems, "notes": marked_texts(notes)}
-        out.emit_json({"schema_version": "1", **numbers, **stated})
-    else:
-        answer = ", ".join(f"{number} {name}" for name, number in numbers.items())
-        causes = [(name, error.problem, error.cure) for name, error in refused.items()]
-        out.emit_tables(Table("Refused", ("input", "problem", "cure"), causes), answer=answer)
+    problems = [{"path": name, **vars(error)} for name, error in refused.items()]
+    told = {"problems": problems, "notes": marked_texts(notes)}
+    causes = [(name, error.problem, error.cure) for name, error in refused.items()]
+    table = Table("Refused", ("input", "problem", "cure"), causes)
+    emit_counts("Tables", numbers, told, table, as_json=as_json)
+    if not as_json:
         out.show_messages(notes)
     return refused
+
+
+def emit_counts(
+    title: str,
+    counts: Mapping[str, object],
+    told: Mapping[str, object],
+    *tables: Table,
+    as_json: bool,
+) -> None:
+    """Print numbers of inputs and tables, or in JSON the numbers and what else is told."""
+    if as_json:
+        out.emit_json({"schema_version": "1", **counts, **told})
+    else:
+        rows = [(name.replace("_", " "), str(number)) for name, number in counts.items()]
+        out.emit_tables(Table(title, ("", ""), rows), *tables)

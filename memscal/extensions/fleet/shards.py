@@ -28,7 +28,7 @@ FLEET_SCHEMA_VERSION = "1.2.0"
 DIGEST = "memscal_shard_sha256"
 #: What states the batch, and the bytes that it may have; scans that a message names.
 _BATCH = "batch.json"
-_MOST_STATED = 10_000
+_MOST_STATED = 100_000
 _NAMED = 5
 TABLE_SUFFIXES = (".csv", ".tsv", ".txt", ".dat", ".xlsx", ".parquet", ".tdms")
 """Endings of tables of readings."""
