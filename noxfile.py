@@ -135,6 +135,14 @@ def judges(session: nox.Session) -> None:
         run_pytest(session, "-m", "judges", "tests/judges", *session.posargs)
 
 
+@nox.session(python=["3.12", "3.13"], default=False)
+def later_pythons(session: nox.Session) -> None:
+    """Import everything and calibrate by a later Python, where there is one (nox says if not)."""
+    with outside_the_checkout(session, requirements=["hypothesis>=6.110", "pytest>=8.2"]):
+        quick = ("tests/test_arguments.py", "tests/test_imports.py", "tests/axisymmetry")
+        run_pytest(session, *(session.posargs or quick))
+
+
 @nox.session
 def docs(session: nox.Session) -> None:
     """Build the documentation into site/, without a warning and without the network."""
