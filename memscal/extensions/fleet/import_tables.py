@@ -27,6 +27,8 @@ def import_tables(context: click.Context, options: Options) -> int:
     recipe = asked["save_recipe"]
     force = asked["force"]
     writing = not asked["dry_run"]
+    if asked["figure"]:
+        raise click.UsageError("--figure belongs to one table.")
     targets = _targets(expanded(asked["tables"]), folder)
     options = prepared(targets.values(), asked["kind"], options)
     wanted = [path for path in targets if not (asked["resume"] and path.exists())]
@@ -72,6 +74,9 @@ def _targets(sources: Iterable[Path], folder: Path) -> dict[Path, Path]:
                     cure="Rename one of them, or import them to folders of their own.",
                 )
             targets[target] = table
+    if not targets:
+        cure = f"Their names end in {', '.join(TABLE_SUFFIXES)}."
+        raise InputError("The folder holds no tables.", cure=cure)
     return targets
 
 

@@ -149,6 +149,8 @@ def test_two_tables_of_one_name_and_tables_without_a_recipe_are_refused(run, tab
     line = ["import", *tables, "others", "-o", "scans", "--recipe", "recipe.toml"]
     run(*line).exits(3, "dies/die_0_7.csv and others/die_0_7.txt would both be written")
     assert not Path("scans").exists()
+    Path("empty").mkdir()
+    run("import", "empty", *line[-4:]).exits(3, "holds no tables", ".csv, .tsv")
     for source in ("dies", "dies/*.csv"):
         run("batch", source, "-o", "results").exits(3, "--save-recipe", "--recipe recipe.toml")
     assert not Path("results").exists()
