@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from memscal.cli.failures import DONE, REFUSED, debug_option, failure_object
+from memscal.cli.failures import DONE, REFUSED, debug_option
 from memscal.cli.options import FILE, json_option
 from memscal.cli.output import emit_json, emit_tables, error
 from memscal.summaries.table import Table
@@ -32,16 +32,16 @@ def command(file: Path, as_json: bool) -> int:
     passed = all(finding.passed for finding in findings)
     problem = f"{file} is not in order: see {findings[-1].name}."
     if as_json:
-        refusal = {} if passed else {"error": failure_object("FormatError", REFUSED, problem)}
-        emit_json(
-            {
-                "schema_version": "1",
-                "file": str(file),
-                "passed": passed,
-                "findings": [vars(finding) for finding in findings],
-                **refusal,
-            }
-        )
+        report = {
+            "schema_version": "1",
+            "file": str(file),
+            "passed": passed,
+            "findings": [vars(finding) for finding in findings],
+        }
+        if not passed:
+            refusal = {"class": "FormatError", "problem": problem, "why": "", "cure": ""}
+            report["error"] = refusal | {"exit_code": REFUSED}
+        emit_json(report)
     else:
         rows = [(f.name, "passed" if f.passed else "FAILED", f.meaning) for f in findings]
         failed = frozenset(i for i, f in enumerate(findings) if not f.passed)

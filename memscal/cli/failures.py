@@ -29,9 +29,6 @@ _UNPRINTED = (errno.EPIPE, errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, e
 
 _Command = TypeVar("_Command", bound=Callable[..., Any])
 
-Described = dict[str, Any]
-"""A failure: class, problem, why, cure and exit code."""
-
 
 @dataclass
 class Session:
@@ -107,7 +104,7 @@ def guarded(command: click.Command, arguments: Sequence[str] | None) -> int:
     """Run a command; return its exit code, or that of its failure after saying what it was."""
     session = Session()
     given = sys.argv[1:] if arguments is None else arguments
-    came: list[int] = []
+    came = []
     with warnings.catch_warnings():
         warnings.showwarning = _show_warning
         try:
@@ -115,7 +112,7 @@ def guarded(command: click.Command, arguments: Sequence[str] | None) -> int:
                 done = command.main(given, prog_name="memscal", standalone_mode=False, obj=session)
                 return done if isinstance(done, int) else DONE
         except (Exception, KeyboardInterrupt) as failure:  # noqa: BLE001 - the last resort
-            if session.debug and not isinstance(failure, click.UsageError):
+            if session.debug:
                 import traceback
 
                 click.echo(traceback.format_exc(), file=sys.stderr, nl=False)
@@ -126,22 +123,9 @@ def guarded(command: click.Command, arguments: Sequence[str] | None) -> int:
         return int(described.get("exit_code", DONE))
 
 
-def failure_object(kind: str, code: int, problem: str, why: str = "", cure: str = "") -> Described:
-    """Return a failure as the object that ``--json`` prints of it."""
-    return {"class": kind, "problem": problem, "why": why, "cure": cure, "exit_code": code}
-
-
-def _reported(failure: BaseException, came: Sequence[int]) -> Described:
+def _reported(failure: BaseException, came: Sequence[int]) -> dict[str, Any]:
     """Say what a failure was; return it as an object, empty where it is none."""
-    if isinstance(failure, click.UsageError):
-        failure.show()
-        cure = f"See {failure.ctx.command_path} --help." if failure.ctx else ""
-        return failure_object("UsageError", USAGE, failure.format_message(), cure=cure)
-    if isinstance(failure, click.Abort | KeyboardInterrupt):
-        if not isinstance(failure.__cause__, EOFError):
-            problem = "Interrupted. Nothing was left half-written."
-            message(problem)
-            return failure_object("Interrupted", 128 + came[0] if came else INTERRUPTED, problem)
+    if isinstance(failure, click.Abort) and isinstance(failure.__cause__, EOFError):
         failure = failure.__cause__
     if isinstance(failure, OSError) and failure.filename is None and failure.errno in _UNPRINTED:
         # click printed a help text; a reader that goes away is no failure.
@@ -150,21 +134,35 @@ def _reported(failure: BaseException, came: Sequence[int]) -> Described:
         if away:
             return {}
     kind = type(failure).__name__
-    if isinstance(failure, MemscalError):
-        told = failure.problem, failure.why, failure.cure
-        code = failure.exit_code
-    elif isinstance(failure, MemoryError):
-        cure = "Close other programs, or give a scan with fewer points."
-        told = "The computer ran out of memory.", "", cure
-        code = INTERNAL
+    code = INTERNAL
+    why = cure = ""
+    if isinstance(failure, click.UsageError):
+        kind = "UsageError"
+        code = USAGE
+        problem = failure.format_message()
+        cure = f"See {failure.ctx.command_path if failure.ctx else 'memscal'} --help."
+        failure.show()
+    elif isinstance(failure, click.Abort | KeyboardInterrupt):
+        kind = "Interrupted"
+        code = 128 + came[0] if came else INTERRUPTED
+        problem = "Interrupted. Nothing was left half-written."
+        message(problem)
     else:
-        text = " ".join(str(failure).split())
-        fault = kind + (f" ({text})" if text else "")
-        cure = "Please report it, with what `memscal --debug` and the same arguments print."
-        told = f"memscal failed by a fault of its own, not of its input: {fault}.", "", cure
-        code = INTERNAL
-    error(*told)
-    return failure_object(kind, code, *told)
+        if isinstance(failure, MemscalError):
+            code = failure.exit_code
+            problem = failure.problem
+            why = failure.why
+            cure = failure.cure
+        elif isinstance(failure, MemoryError):
+            problem = "The computer ran out of memory."
+            cure = "Close other programs, or give a scan with fewer points."
+        else:
+            text = " ".join(str(failure).split())
+            fault = kind + (f" ({text})" if text else "")
+            problem = f"memscal failed by a fault of its own, not of its input: {fault}."
+            cure = "Please report it, with what `memscal --debug` and the same arguments print."
+        error(problem, why, cure)
+    return {"class": kind, "problem": problem, "why": why, "cure": cure, "exit_code": code}
 
 
 def _show_warning(message: Warning | str, category: type[Warning], *_: Any, **__: Any) -> None:

@@ -13,7 +13,7 @@ from memscal.mechanics.contact import BaseStress, Contact
 from memscal.mechanics.press_rod import press_rod
 from memscal.model.film import LINEAR, ElasticFilm
 from memscal.model.indenter import Rod
-from memscal.model.provenance import SourceFile
+from memscal.model.provenance import Difference, accepted_differences, file_in_words
 from memscal.model.quantities import Record
 from memscal.model.records import FILM, INDENTER, LOAD
 from memscal.model.scan import Scan
@@ -134,7 +134,7 @@ def require_same_set_up(
             differences += _other_set_up(scan, stress, "alternative")
     cure = "Give a stress that was calculated for the scan (memscal reference), or correct the "
     cure += "value that is wrong."
-    if any(text.startswith("load") for text in differences):
+    if any(difference[2].startswith("load") for difference in differences):
         cure += " If the film of the reference is linear, state it (memscal import --film-law "
         cure += "linear; ElasticFilm(law='linear') in Python)."
     return accepted_differences(
@@ -147,8 +147,8 @@ def require_same_set_up(
     )
 
 
-def _other_set_up(scan: Scan, stress: BaseStress, kind: str) -> list[str]:
-    """Return in words what of film, rod and load a stress was not calculated for."""
+def _other_set_up(scan: Scan, stress: BaseStress, kind: str) -> list[Difference]:
+    """Return what of film, rod and load a stress was not calculated for."""
     source = None if isinstance(stress, Contact) else stress.source
     places = (file_in_words(scan.source, "scan"), file_in_words(source, kind))
     film = film_of(stress)
@@ -172,11 +172,9 @@ def _other_set_up(scan: Scan, stress: BaseStress, kind: str) -> list[str]:
     if law == LINEAR or (scan.load is None and scan.normal_load is None):
         return differences
     loads = (_farthest(scan, stress), stress)
-    stated = f"law is {law or 'not stated'}"
-    return differences + [
-        f"{text}, whose {stated}: the stress is proportional to the load under a linear law only"
-        for text in stated_differences(LOAD, ("load",), loads, places)
-    ]
+    # Under another law the stress is not proportional to the load.
+    there = f"{places[1]} (film: {law or 'law not stated'})"
+    return differences + stated_differences(LOAD, ("load",), loads, (places[0], there))
 
 
 def _farthest(scan: Scan, stress: BaseStress) -> SimpleNamespace:
@@ -189,15 +187,10 @@ def _farthest(scan: Scan, stress: BaseStress) -> SimpleNamespace:
     return SimpleNamespace(load=float(loads.flat[i]), load_uncertainty=uncertainty)
 
 
-def file_in_words(source: SourceFile | None, kind: str) -> str:
-    """Name what a file holds, for messages: "the scan rod.h5"."""
-    return f"the {kind} {source.file_name}" if source else f"the {kind}"
-
-
 def stated_differences(
     record: Record, names: Sequence[str], stated: Sequence[Any], places: Sequence[str], of: str = ""
-) -> list[str]:
-    """Return in words which quantities two sides both state, and with values that do not agree."""
+) -> list[Difference]:
+    """Return which quantities two sides both state, and with values that do not agree."""
     # Numbers agree within twice the standard uncertainty of their difference, or within 1e-6 of
     # them where no uncertainty is stated; texts if they are equal.
     differences = []
@@ -212,26 +205,12 @@ def stated_differences(
             continue
         words = quantity.words if " of the " in quantity.words else f"{of} {quantity.words}"
         sides = []
-        for value, spread, place in zip(values, spreads, places, strict=True):
+        for value, spread in zip(values, spreads, strict=True):
             shown = f'"{value}"'
             if not isinstance(value, str):
                 u = "not stated" if spread is None else f"{spread / quantity.scale:.2g}"
                 unit = quantity.unit and f" {quantity.unit}"
                 shown = f"{value / quantity.scale:.7g}{unit} (u {u})"
-            sides.append(f"{shown} in {place}")
-        differences.append(f"{words.strip()} {', '.join(sides)}")
+            sides.append(shown)
+        differences.append((*places, words.strip(), *sides))
     return differences
-
-
-def accepted_differences(
-    differences: Sequence[str], *, override: bool, problem: str, why: str, cure: str
-) -> list[str]:
-    """Refuse what does not agree; with ``override`` return it, each difference once."""
-    if differences and not override:
-        raise InputError(
-            f"{problem}: {'; '.join(dict.fromkeys(differences))}.",
-            why=why,
-            cure=f"{cure} To go on all the same, override it (override=True; --override on the "
-            "command line): that is recorded.",
-        )
-    return list(dict.fromkeys(differences))

@@ -10,7 +10,6 @@ import numpy as np
 from memscal.apparatus import ApparatusFunction, opened_apparatus
 from memscal.errors import InputError
 from memscal.estimation.points import measured_mask
-from memscal.estimation.set_up import accepted_differences
 from memscal.extensions import hook
 from memscal.formats.cache import CacheFolder
 from memscal.formats.opened import Contacts, opened_contacts
@@ -36,7 +35,7 @@ from memscal.model.arrays import Values, require_non_negative
 from memscal.model.checks import Message, override_messages
 from memscal.model.indenter import Sphere
 from memscal.model.measured_stress import MeasuredScan, MeasuredStress
-from memscal.model.provenance import accepted_alterations
+from memscal.model.provenance import accepted_alterations, accepted_differences
 from memscal.model.scan import Scan
 from memscal.model.sizes import MOST_COMPARED, MOST_COMPARED_TOGETHER, too_large
 from memscal.model.stress import StressProfile
@@ -83,11 +82,13 @@ def same_apparatus(
     """Refuse another apparatus function than that of a measured stress; or record it."""
     differences = accepted_alterations(apparatus.source)
     if measured.artifact_digest != apparatus.content_digest:
-        name = f" ({measured.artifact.file_name})" if measured.artifact else ""
-        given = f" ({apparatus.source.file_name})" if apparatus.source else ""
-        other = f"the stress was measured with another apparatus function{name} than the given"
+        name = measured.artifact.file_name if measured.artifact else ""
+        given = apparatus.source.file_name if apparatus.source else ""
+        # A file can have been written again under its name.
+        this = f"{name} (digest {measured.artifact_digest[:8]})"
+        that = f"{given} (digest {apparatus.content_digest[:8]})"
         differences += accepted_differences(
-            [other + given],
+            [("the measured stress", "the command", "apparatus function", this, that)],
             override=override,
             problem="Measured stress and artifact do not belong together",
             why="The stress on the axis, centres and noise are those of the calibration by which "

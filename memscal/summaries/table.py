@@ -172,6 +172,17 @@ def text_of(
     return "\n\n".join([*head, *blocks])
 
 
+def table_of(differences: Iterable[Sequence[str]]) -> str:
+    """Return what each two places state of quantities, places first, as aligned lines."""
+    rows: list[Sequence[str]] = []
+    for here, there, *stated in differences:
+        head = ["quantity", here, there]
+        if head not in rows:
+            rows.append(head)
+        rows.append(stated)
+    return Table("", [""] * 3, rows).plain()
+
+
 @dataclass(frozen=True)
 class Table:
     """A table of text: its title, names of the columns (or none), cells, and rows that failed.

@@ -60,30 +60,30 @@ LOADS = replace(SCAN, normal_load=np.geomspace(0.998, 1.001, SCAN.u_zz.size))
         (
             {"thickness": 2.058e-3},
             {},
-            r"film thickness 2\.058 mm \(u 0\.02\) in the scan, 2 mm \(u 0",
+            r"film thickness +2\.058 mm \(u 0\.02\).* 2 mm \(u 0",
         ),
         ({"thickness": 2.000001e-3, **EXACTLY}, EXACTLY, None),
         ({"thickness": 2.00001e-3, **EXACTLY}, EXACTLY, r"2\.00001 mm \(u not stated\)"),
-        ({"poisson_ratio": 0.48}, {}, r"film Poisson's ratio 0\.48 \(u 0\.005\)"),
-        ({"young_modulus": 9e6}, RUBBER, r"film Young's modulus 9 MPa .*, 2\.2 MPa"),
+        ({"poisson_ratio": 0.48}, {}, r"film Poisson's ratio +0\.48 \(u 0\.005\)"),
+        ({"young_modulus": 9e6}, RUBBER, r"film Young's modulus +9 MPa .* 2\.2 MPa"),
         (
             {"law": "linear"},
             RUBBER,
-            'film law "linear" in the scan, "neo-hookean" in the reference',
+            r'film law +"linear".* "neo-hookean"',
         ),
-        ({"radius": 0.26e-3}, {}, r"rod radius 0\.26 mm"),
+        ({"radius": 0.26e-3}, {}, r"rod radius +0\.26 mm"),
         ({"rod_friction": np.inf}, {"friction_coefficient": 0.0}, None),
         (
             {"rod_friction": np.inf},
             {"friction_coefficient": 0.0, **RUBBER},
-            "friction of the rod inf",
+            "friction of the rod +inf",
         ),
         ({"load": 0.5}, {"law": "linear"}, None),
-        ({"load": 0.5}, {"law": ""}, r"load 0\.5 N \(u not stated\) in .* law is not stated"),
-        ({"load": 0.5}, RUBBER, "whose law is neo-hookean"),
-        ({"normal_load": LOADS.normal_load}, RUBBER, r"load 0\.998 N"),
+        ({"load": 0.5}, {"law": ""}, r"load +0\.5 N \(u not stated\)"),
+        ({"load": 0.5}, RUBBER, "film: neo-hookean"),
+        ({"normal_load": LOADS.normal_load}, RUBBER, r"load +0\.998 N"),
         ({"normal_load": LOADS.normal_load, "load_uncertainty": 2e-3}, RUBBER, None),
-        ({}, {"film": None, "load": 1.01}, "load 1 N"),
+        ({}, {"film": None, "load": 1.01}, "load +1 N"),
     ],
 )
 def test_a_reference_agrees_with_its_scan_within_their_uncertainties(scan, table, words):
@@ -108,7 +108,7 @@ def test_an_alternative_may_have_another_law_and_no_other_thickness():
     film = replace(FILM, **RUBBER)
     other = replace(TABLE, film=film, friction_coefficient=np.inf)
     assert require_same_set_up([scan], [None], [other], override=False) == []
-    with pytest.raises(InputError, match=r"film thickness .* in the alternative"):
+    with pytest.raises(InputError, match=r"the alternative\n +film thickness"):
         memscal.calibrate(scan, alternative=replace(other, film=replace(film, thickness=3e-3)))
 
 
@@ -117,7 +117,7 @@ def test_a_reference_that_travels_in_the_scan_takes_its_film_and_agrees(tmp_path
     memscal.write_scan(scan, tmp_path / "scan.h5")
     read = memscal.read_scan(tmp_path / "scan.h5")
     assert require_same_set_up([read], [None], override=False) == []
-    with pytest.raises(InputError, match=r"load 0\.5 N"):
+    with pytest.raises(InputError, match=r"load +0\.5 N"):
         memscal.calibrate(replace(scan, load=0.5))
 
 
