@@ -21,7 +21,7 @@ from memscal.axisymmetry.hankel import (
     ring_areas,
 )
 from memscal.axisymmetry.kernels import unit_gaussian
-from memscal.errors import InputError
+from memscal.errors import InputError, counted
 from memscal.estimation.points import TANGENTIAL
 from memscal.extensions import hook
 from memscal.model.apparatus import ApparatusData, ApparatusField
@@ -386,14 +386,14 @@ class ApparatusFunction(Result, ApparatusData):
             return radii, RadialSpectrum(nodes, sigma_zz.transform(nodes.k), order)
         stress = finite_vector("sigma_zz", sigma_zz)
         if radii.shape != stress.shape:
-            raise InputError(f"There are {stress.size} stresses for {radii.size} radii.")
+            raise InputError(f"r and sigma_zz differ in length: {radii.size} and {stress.size}.")
         require_increasing("r", radii)
         if radii[-1] > _LARGEST_RADIUS:
             raise InputError(
                 f"r reaches {radii[-1]:g} m.", cure="Give radii in metres, not millimetres."
             )
         if radii.size < _FEWEST_RADII:
-            raise InputError(f"A stress at {radii.size} radii cannot be interpolated.")
+            raise InputError(f"A stress at {counted(radii.size, 'points')} cannot be interpolated.")
         if not 0 <= radii[0] <= radii[1] - radii[0]:
             raise InputError(
                 f"r begins at {radii[0]:g} m.",
@@ -491,7 +491,7 @@ def opened_apparatus(
         return load_apparatus(apparatus, accept_altered=accept_altered)
     if not isinstance(apparatus, ApparatusFunction):
         raise InputError(
-            f"There is a {type(apparatus).__name__} where an apparatus function is needed.",
+            f"{type(apparatus).__name__} is given where an apparatus function is needed.",
             cure="Give one, such as Calibration.apparatus, or the path of its artifact.",
         )
     return apparatus

@@ -87,6 +87,11 @@ class OutputError(MemscalError):
     exit_code = 4
 
 
+def counted(number: int, things: str) -> str:
+    """Return a number of things in words: "1 point", "3 points"."""
+    return f"{number} {things.removesuffix('s') if number == 1 else things}"
+
+
 @contextmanager
 def placed(where: str) -> Iterator[None]:
     """Say in an error about a value in which file, and where in it, the value stands."""

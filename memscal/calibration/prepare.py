@@ -200,9 +200,8 @@ def _references(
     strength = scans[0].load or (1.0 if loads is None else float(np.nanmedian(loads)))
     if isinstance(reference, Sequence) and not isinstance(reference, str):
         if len(reference) != len(scans):
-            count = "is one scan" if len(scans) == 1 else f"are {len(scans)} scans"
             raise InputError(
-                f"{len(reference)} references were given, but there {count}.",
+                f"References and scans differ in number: {len(reference)} and {len(scans)}.",
                 cure="Give one for each scan, in their order, or one for all.",
             )
         return [_read(item, strength, request) for item in reference]
@@ -225,7 +224,7 @@ def _read(reference: Reference, load: float, request: Request) -> BaseStress | N
     if reference is None or isinstance(reference, BaseStress):
         return reference
     raise InputError(
-        f"The reference is a {type(reference).__name__}.",
+        f"The reference is of type {type(reference).__name__}.",
         cure="Give a contact from memscal.indent(), a StressProfile, a StressField, an ideal one "
         "such as disc:0.5mm, or the path of a file.",
     )

@@ -171,7 +171,7 @@ def lift(r: FloatArray, profile: FloatArray, spacing: float, extent: float) -> F
     r = finite_vector("r", r)
     profile = finite_vector("profile", profile)
     if r.shape != profile.shape:
-        raise InputError(f"There are {profile.size} values of the profile for {r.size} radii.")
+        raise InputError(f"r and the profile differ in length: {r.size} and {profile.size}.")
     require_increasing("r", r)
     if r[0] < 0:
         raise InputError(f"r begins at {r[0]:g} m.", cure="Give radii from the axis outward.")

@@ -579,6 +579,8 @@ def point_messages(estimate: ProfileEstimate) -> list[Message]:
     messages = []
     if points.missing:
         text = f"{points.missing} points of the scan are missing and were left out."
+        if points.missing == 1:
+            text = "A point of the scan is missing and was left out."
         messages.append(Message("missing_points", text))
     if estimate.basis.angular and points.u.size > MOST_READINGS:
         text = (
@@ -603,6 +605,6 @@ def point_messages(estimate: ProfileEstimate) -> list[Message]:
         messages.append(Message("outlier", text))
     more = outliers.size - _MOST_LISTED
     if more > 0:
-        text = f"{more} more outliers depart by less and have reduced weights, too."
+        text = f"More outliers, which depart by less and have reduced weights, too: {more}."
         messages.append(Message("outlier", text))
     return messages

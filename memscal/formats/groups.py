@@ -240,7 +240,7 @@ def read_parameters(file: SafeFile, path: str, reading: Reading) -> ParameterSet
     covariance = file.require_array(f"{path}/covariance", "dimensionless", ndim=2)
     if covariance.shape != (len(names), len(names)):
         raise FormatError(
-            f"{file.where(path)}/covariance has shape {covariance.shape} for {len(names)} names."
+            f"{file.where(path)}/covariance has shape {covariance.shape} with names: {len(names)}."
         )
     scale = np.array(scales)
     return ParameterSet(

@@ -4,7 +4,7 @@ from collections.abc import Hashable, Iterable, Sequence
 from os import PathLike
 from typing import Any, TypeAlias
 
-from memscal.errors import InputError
+from memscal.errors import InputError, counted
 from memscal.formats.files import FilePath
 from memscal.formats.hdf5.reader import open_hdf5
 from memscal.formats.hdf5.writer import SCHEMA_ATTRIBUTE, STRESS_SCHEMA
@@ -26,7 +26,7 @@ def opened_scan(scan: Any, most: int | None = None, *, accept_altered: bool = Fa
         return scan
     if not isinstance(scan, str | PathLike):
         raise InputError(
-            f"There is a {type(scan).__name__} where a Scan is needed.",
+            f"{type(scan).__name__} is given where a Scan is needed.",
             cure="Give a scan, or the path of its file.",
         )
     with open_hdf5(scan, accept_altered=accept_altered) as file:
@@ -65,7 +65,9 @@ def contents_of(scan: Scan) -> tuple[str, Hashable]:
     """Return a scan's name, and what tells it from another."""
     arrays = scan.x, scan.y, scan.u_zz, scan.normal_load, *scan.channels.values()
     stated = scan.direction, scan.load, scan.unit, scan.lubrication
-    named = scan.source.file_name if scan.source else f"A scan of {scan.u_zz.size} points"
+    named = (
+        scan.source.file_name if scan.source else f"A scan of {counted(scan.u_zz.size, 'points')}"
+    )
     return named, (*stated, *(a if a is None else a.tobytes() for a in arrays))
 
 

@@ -81,7 +81,7 @@ def to_si(values: ArrayLike, unit: str | None, dimension: str, where: str) -> Fl
             return numbers
         raise UnitError(
             f"{where} has no unit.",
-            why=f"It is a {dimension}, and a bare number could be in any unit.",
+            why=f"Its dimension is {dimension}, and a bare number could be in any unit.",
             cure=f'Add an attribute units, such as "{DIMENSIONS[dimension].stored}".',
         )
     power = _power(unit.strip(), dimension)
@@ -201,7 +201,7 @@ def _pint_quantity(unit: str, dimension: str, where: str) -> Any:
     except Exception as error:  # pint raises what its parser happens to meet
         raise UnitError(
             f'{where} has the unit "{_shown(unit)}", which is unknown, or has a zero of its own.',
-            why=f"It is a {dimension}.",
+            why=f"Its dimension is {dimension}.",
             cure=cure,
         ) from error
 
@@ -230,8 +230,9 @@ def _registry() -> Any:
 def _wrong_dimension(where: str, unit: str, dimension: str) -> UnitError:
     grams = ' (of weights in grams, "gf")' if dimension == "force" else ""
     stored = DIMENSIONS[dimension].stored
+    article = "an" if dimension[0] in "ae" else "a"
     return UnitError(
-        f'{where} has the unit "{_shown(unit)}", but it must be a {dimension}.',
+        f'{where} has the unit "{_shown(unit)}", but it must be {article} {dimension}.',
         why="A number in a unit of another kind cannot be converted.",
         cure=f'Give it in "{stored}" or another unit of {dimension}{grams}.',
     )

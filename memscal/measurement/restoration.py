@@ -244,7 +244,7 @@ class Restoration(Result, Checked):
         if isinstance(expected, BaseStress):
             return _compared(self, expected)
         raise InputError(
-            f"The expected stress is a {type(expected).__name__}.",
+            f"The expected stress is of type {type(expected).__name__}.",
             cure="Give a contact from memscal.indent(), a StressProfile, or the path of a file.",
         )
 

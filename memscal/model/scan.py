@@ -461,7 +461,7 @@ class Scan:
             errors = finite_vector("x_errors of the scan", self.x_errors)
             if errors.shape != self.x.shape or np.any(errors < 0):
                 raise InputError(
-                    f"x_errors holds {errors.size} values for {self.x.size} positions, the "
+                    f"x_errors has length {errors.size} for {self.x.size} positions, the "
                     f"smallest {errors.min(initial=0.0) * 1e3:.4g} mm.",
                     cure="Give one standard uncertainty for each position, in m, none negative.",
                 )

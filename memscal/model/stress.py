@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 from scipy.special import j0, j1
 
-from memscal.errors import InputError
+from memscal.errors import InputError, counted
 from memscal.model.arrays import (
     TINY,
     ArrayPair,
@@ -173,7 +173,7 @@ class StressField:
             steps = np.diff(axis)
             if not _FEWEST <= axis.size <= MOST_PIXELS or np.ptp(steps) > _EVEN * steps.mean():
                 raise InputError(
-                    f"{name} of the field has {axis.size} values, or uneven ones: not {_FEWEST} to "
+                    f"{name} of the field has length {axis.size}, or is uneven: not {_FEWEST} to "
                     f"{MOST_PIXELS} even ones.",
                     cure="Cut out what is not zero, and interpolate it to even pixels.",
                 )
@@ -326,8 +326,8 @@ class StressProfile:
                 object.__setattr__(self, name, values)
                 if values.size != self.r.size:
                     raise InputError(
-                        f"{name} of the stress profile has {values.size} values for "
-                        f"{self.r.size} radii."
+                        f"{name} of the stress profile has {counted(values.size, 'values')} for "
+                        f"{counted(self.r.size, 'values')} of r."
                     )
         require_increasing("r of the stress profile", self.r)
         if self.r[0] < 0:

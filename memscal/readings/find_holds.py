@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from memscal.errors import InputError
+from memscal.errors import InputError, counted
 from memscal.model.arrays import Arrays, BoolArray, FloatArray, IndexArray
 from memscal.model.holds import Holds
 from memscal.model.notation import Reading
@@ -59,7 +59,7 @@ def find_holds(
     u = columns["u_zz"]
     load = columns.get("normal_load")
     if u.size < _FEWEST:
-        raise InputError(f"The log has {u.size} rows without gaps.", cure=_CURE)
+        raise InputError(f"The log has {counted(u.size, 'rows')} without gaps.", cure=_CURE)
     position = columns["x"] + 1j * columns.get("y", np.zeros(u.size))
     way = np.hypot(np.ptp(position.real), np.ptp(position.imag))
     moves = np.abs(np.diff(position)) > _MOVING * way
@@ -132,9 +132,9 @@ def _averaged(
         [u[run[-n:]].mean() - u[run[:n]].mean() for run, n in zip(held, thirds, strict=True)]
     )
     averaged = (
-        f"{len(held)} holds of {size.min()} to {size.max()} rows, the first in lines "
-        f"{line[first[0]]} to {line[stop[0] - 1]}, are averaged to one reading each; "
-        f"{left_out} presses of fewer than {_FEWEST} steady rows are left out."
+        f"{counted(len(held), 'holds')} of {size.min()} to {size.max()} rows, the first in lines "
+        f"{line[first[0]]} to {line[stop[0] - 1]}, averaged to one reading each; "
+        f"left out: {counted(left_out, 'presses')} of fewer than {_FEWEST} steady rows."
     )
     scatters = (
         f"Within a hold the readings scatter by {reading.text(np.median(scatter))}, neighbouring "

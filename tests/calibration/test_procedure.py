@@ -162,7 +162,7 @@ def test_the_sweep_is_flat_about_the_rule_s_choice():
     ("arguments", "words"),
     [
         ({"reference": {1: 2}}, "The reference is a dict"),
-        ({"reference": [None, None]}, "2 references were given, but there is one scan"),
+        ({"reference": [None, None]}, "differ in number: 2 and 1"),
         ({"method": 3}, "cannot divide"),
         ({"method": Tikhonov}, "that is set up"),
         ({"options": {"amplitude": "abc"}}, "must be a positive number"),

@@ -302,7 +302,7 @@ def test_stresses_measured_one_by_one_are_those_measured_together():
 
 
 def test_what_is_no_scan_is_refused():
-    with pytest.raises(InputError, match="a float where a Scan is needed"):
+    with pytest.raises(InputError, match="float is given where a Scan is needed"):
         memscal.measure_stress([1.0], SENSOR)
     with pytest.raises(InputError, match="no scan"):
         memscal.measure_stress([], SENSOR)

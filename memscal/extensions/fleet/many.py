@@ -154,7 +154,7 @@ def calibrate_many(
         )
     if not (executor is None or callable(getattr(executor, "submit", None))):
         raise InputError(
-            f"The executor is a {type(executor).__name__}, which takes no tasks.",
+            f"The executor is of type {type(executor).__name__}, which takes no tasks.",
             cure="Give a concurrent.futures.Executor, or leave it out.",
         )
     known = CalibrationOptions.__annotations__

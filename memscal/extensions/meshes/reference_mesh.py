@@ -118,7 +118,7 @@ def find_base(mesh: Mesh, frame: Frame, level: float | None) -> Base:
     if base_nodes.size < _FEWEST:
         nearest = heights[np.argmin(np.abs(heights - position))]
         raise InputError(
-            f"Only {base_nodes.size} nodes of the film in {mesh.source.file_name} lie on its base, "
+            f"{mesh.source.file_name} has too few nodes on its film's base: {base_nodes.size}, "
             f"at {level_text}.",
             why=f"The mesh reaches from {AXES[frame.vertical]} = {lowest * 1e3:.6g} mm to "
             f"{highest * 1e3:.6g} mm, and its nearest node is at {nearest * 1e3:.6g} mm.",
@@ -340,7 +340,7 @@ def _along_radius(
         distinct = 1 + np.count_nonzero(np.diff(np.sort(r)) > frame.tolerance)
         if distinct < _FEWEST_RADII:
             raise InputError(
-                f"The base in {samples.source.file_name} has values at {distinct} radii only.",
+                f"The base in {samples.source.file_name} has values at too few radii: {distinct}.",
                 cure="Name the axis across the film (vertical; --vertical), or give a finer mesh.",
             )
         return replace(samples, columns={"r": r, **samples.columns})

@@ -24,7 +24,7 @@ def apparatus_function(kernel: RadialKernel | None) -> RadialKernel:
         return GaussianMixture()
     if not isinstance(kernel, RadialKernel):
         raise InputError(
-            f"The kernel is a {type(kernel).__name__}, which has no transform(), radial() and "
+            f"The kernel is of type {type(kernel).__name__}, without transform(), radial() and "
             "describe().",
             cure="Give a GaussianMixture, a SmoothedDisc, or an object with these three methods.",
         )

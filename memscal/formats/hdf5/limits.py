@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import h5py
 
-from memscal.errors import UnsafeFileError
+from memscal.errors import UnsafeFileError, counted
 from memscal.model.sizes import MOST_ARRAY_BYTES, MOST_HDF5_BYTES
 
 _DESCRIPTOR = 16
@@ -210,7 +210,9 @@ def check_layout(where: str, dataset: Any, data: bytes, *, text: bool) -> Layout
     check_type(where, kind, text=text)
     if len(shape) > (0 if text else _MAX_RANK):
         expected = "one piece of text" if text else f"at most {_MAX_RANK} dimensions"
-        raise refuse(where, f"has {len(shape)} dimensions", f"It should have {expected}.")
+        raise refuse(
+            where, f"has {counted(len(shape), 'dimensions')}", f"It should have {expected}."
+        )
     limit = MAX_TEXT_BYTES if text else MOST_ARRAY_BYTES
     size = claimed if text else max(claimed, of.held)
     if size > limit:

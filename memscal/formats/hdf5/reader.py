@@ -229,7 +229,7 @@ class SafeFile:
         if not self.has(path):
             raise FormatError(
                 f"{self.where(path)} is missing.",
-                why=f"It should hold a {dimension}.",
+                why=f"It should hold values of dimension {dimension}.",
                 cure=f'Write it, with an attribute units such as "{DIMENSIONS[dimension].si}".',
             )
         values = self.array(path)

@@ -112,7 +112,7 @@ def _json_value(subject: str, value: Any) -> Any:
     if isinstance(value, (list, tuple)):
         return [_json_value(subject, item) for item in value]
     raise InputError(
-        f"{subject} holds a {type(value).__name__}, which JSON cannot hold.",
+        f"{subject} holds a value of type {type(value).__name__}, which JSON cannot hold.",
         cure="Give numbers, text, truth values, lists and mappings.",
     )
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from memscal.errors import InputError, require_names
+from memscal.errors import InputError, counted, require_names
 from memscal.extensions import hook
 from memscal.formats.tables.columns import NamedColumns, Wanted
 from memscal.formats.tables.positions import (
@@ -552,7 +552,8 @@ def _counted(columns: Columns, others: str) -> list[str]:
         for name, values in (("x", x), ("y", y))
         if name in columns
     )
-    notes = [f"{x.size} readings{in_repeats} at {places.count} places{apart}; {reach}."]
+    at = f"{in_repeats} at {counted(places.count, 'places')}{apart}"
+    notes = [f"{counted(x.size, 'readings')}{at}; {reach}."]
     if "branch" in columns:
         counts = [(columns["branch"] == number).sum() for number in (1, 2, 0)]
         words = "{} readings on approach, {} on retreat, {} of neither branch."

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from memscal.errors import FormatError, InputError, UnsafeFileError, placed
+from memscal.errors import FormatError, InputError, UnsafeFileError, counted, placed
 from memscal.extensions import hook
 from memscal.formats.files import damage_named, read_bytes
 from memscal.formats.tables.columns import Lines, NamedColumns, Parts, Wanted
@@ -223,7 +223,7 @@ class FrameTable(NamedColumns):
         with _reading(f"{self._name} cannot be read"):
             values = np.asarray(unmasked(self._column(index)))
         if values.shape != (self._rows,):
-            problem = f"{self.where(item.column)} has shape {values.shape} in {self._rows} rows."
+            problem = f"{self.where(item.column)} has shape {values.shape}, not ({self._rows},)."
             raise InputError(problem, cure="Give one value for each row.")
         if values.dtype.kind in "iufb":
             return values.astype(np.float64)
@@ -235,7 +235,10 @@ class FrameTable(NamedColumns):
     def _describe(self, count: int) -> None:
         sha256 = f" (sha256 {self.source.sha256})" if self.source else ""
         origin = f"Imported from {self._name}{sha256}."
-        self.notes = origin, f"Read {count} rows of {len(self.names)} columns."
+        self.notes = (
+            origin,
+            f"Read {counted(count, 'rows')} of {counted(len(self.names), 'columns')}.",
+        )
 
 
 def _columns_in_memory(frame: Any, **reading: Any) -> FrameTable:
@@ -243,7 +246,9 @@ def _columns_in_memory(frame: Any, **reading: Any) -> FrameTable:
     keys = list(frame if isinstance(frame, Mapping) else getattr(frame, "columns", ()))
     if not keys:
         cure = "Give a path, a data frame with columns, or a mapping of names to arrays."
-        raise InputError(f"A {type(frame).__name__} is no table with columns.", cure=cure)
+        raise InputError(
+            f"An object of type {type(frame).__name__} is no table with columns.", cure=cure
+        )
     rows = np.size(frame[keys[0]])
     return FrameTable("a table in memory", keys, rows, lambda i: frame[keys[i]], **reading)
 

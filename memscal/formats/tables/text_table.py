@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from memscal.errors import FormatError, placed
+from memscal.errors import FormatError, counted, placed
 from memscal.formats.files import FilePath, read_pieces
 from memscal.formats.tables.columns import MAX_NAME, NamedColumns, Parts, Wanted
 from memscal.formats.tables.dialect import (
@@ -221,7 +221,7 @@ class TextTable(NamedColumns):
             mark = "comma" if self.decimal == "," else "point"
             delimiter = DELIMITERS.get(self._delimiter, repr(self._delimiter))
             apart = f"separated by a {delimiter}, with a decimal {mark}"
-        notes.append(f"Read {count} rows of {self._width} columns {apart}.")
+        notes.append(f"Read {counted(count, 'rows')} of {counted(self._width, 'columns')} {apart}.")
         self.notes = tuple(notes)
 
     def _refuse_more_names(self) -> None:
@@ -229,7 +229,7 @@ class TextTable(NamedColumns):
         if not self._sure and self._reach < self._named_columns:
             raise FormatError(
                 f"{self._name}: the head in {self._row} {self._header} has {self._named_columns} "
-                f"names, but no row more than {self._reach} cells.",
+                f"names, but no row more than {counted(self._reach, 'cells')}.",
                 why="The last columns are empty, or the names are not above their cells.",
                 cure="If columns are empty, state what separates cells (--delimiter ',' or TAB).",
             )
@@ -254,7 +254,8 @@ class TextTable(NamedColumns):
                 continue
             by = "header" if self._headed else "first row"
             raise FormatError(
-                f"{self._name}: {self._row} {place} has {len(row)} cells, the {by} {stated}.",
+                f"{self._name}: {self._row} {place} has "
+                f"{counted(len(row), 'cells')}, the {by} {stated}.",
                 why="Which cell belongs to which column is not known, or another table begins.",
                 cure="Correct the table, or give each a file of its own; state what separates its "
                 "cells (--delimiter), or write numbers with a decimal point where commas separate "
