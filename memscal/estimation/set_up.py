@@ -13,7 +13,7 @@ from memscal.mechanics.contact import BaseStress, Contact
 from memscal.mechanics.press_rod import press_rod
 from memscal.model.film import LINEAR, ElasticFilm
 from memscal.model.indenter import Rod
-from memscal.model.provenance import Difference, accepted_differences, file_in_words
+from memscal.model.provenance import Difference, SourceFile, accepted_differences
 from memscal.model.quantities import Record
 from memscal.model.records import FILM, INDENTER, LOAD
 from memscal.model.scan import Scan
@@ -185,6 +185,11 @@ def _farthest(scan: Scan, stress: BaseStress) -> SimpleNamespace:
     i = np.nanargmax(np.abs(loads - stress.load) - COVERAGE * spread)
     uncertainty = float(spread.flat[i]) if stated else None
     return SimpleNamespace(load=float(loads.flat[i]), load_uncertainty=uncertainty)
+
+
+def file_in_words(source: SourceFile | None, kind: str) -> str:
+    """Name what a file holds, for messages: "the scan rod.h5"."""
+    return f"the {kind} {source.file_name}" if source else f"the {kind}"
 
 
 def stated_differences(

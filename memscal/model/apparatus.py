@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from scipy.special import stdtrit
 
-from memscal.errors import InputError, counted
+from memscal.errors import InputError
 from memscal.model.arrays import FloatArray, FrozenArrays, array_record, keyword_array_record
 from memscal.model.assumptions import Assumption
 from memscal.model.checks import Checked, QualityCheck, state_of_checks
@@ -166,9 +166,7 @@ class ParameterSet(FrozenArrays):
         super().__post_init__()
         n = len(self.names)
         if self.units and len(self.units) != n:
-            raise InputError(
-                f"{counted(n, 'parameter names')}, but {counted(len(self.units), 'units')}."
-            )
+            raise InputError(f"Numbers of parameters and units differ: {n} and {len(self.units)}.")
         if self.values.shape != (n,) or self.covariance.shape != (n, n):
             raise InputError(
                 f"Parameter names ({n}), {self.values.shape} values and a covariance of shape "

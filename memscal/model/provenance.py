@@ -110,11 +110,6 @@ Difference = tuple[str, ...]
 """Two places, a quantity, and what each of them states of it."""
 
 
-def file_in_words(source: SourceFile | None, kind: str) -> str:
-    """Name what a file holds, for messages: "the scan rod.h5"."""
-    return f"the {kind} {source.file_name}" if source else f"the {kind}"
-
-
 def accepted_differences(
     differences: Sequence[Difference], *, override: bool, problem: str, why: str, cure: str
 ) -> list[str]:

@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 from scipy.special import j0, j1
 
-from memscal.errors import InputError, counted
+from memscal.errors import InputError
 from memscal.model.arrays import (
     TINY,
     ArrayPair,
@@ -326,8 +326,7 @@ class StressProfile:
                 object.__setattr__(self, name, values)
                 if values.size != self.r.size:
                     raise InputError(
-                        f"{name} of the stress profile has {counted(values.size, 'values')} for "
-                        f"{counted(self.r.size, 'values')} of r."
+                        f"{name} of the stress profile has length {values.size}, r {self.r.size}."
                     )
         require_increasing("r of the stress profile", self.r)
         if self.r[0] < 0:

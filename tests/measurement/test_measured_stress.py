@@ -205,7 +205,7 @@ def test_what_does_not_belong_together_is_refused_by_both_names(changes, words):
 def test_a_film_of_another_name_is_refused_unless_it_is_overridden():
     named = replace(SENSOR, film=replace(made.EXACT_FILM, name="film 1"))
     scan = replace(made.contact_scan(load=(1.37,)), film=replace(made.EXACT_FILM, name="film 2"))
-    with pytest.raises(InputError, match='film +"film 2" +"film 1"'):
+    with pytest.raises(InputError, match=r'film +"film 2" +"film 1"'):
         memscal.measure_stress(scan, named)
     found = memscal.measure_stress(scan, named, override=True)
     assert len(found.overridden) == 1
