@@ -173,7 +173,7 @@ class StressField:
             steps = np.diff(axis)
             if not _FEWEST <= axis.size <= MOST_PIXELS or np.ptp(steps) > _EVEN * steps.mean():
                 raise InputError(
-                    f"{name} of the field has length {axis.size}, or is uneven: not {_FEWEST} to "
+                    f"{name} of the field has {axis.size} values, or uneven ones: not {_FEWEST} to "
                     f"{MOST_PIXELS} even ones.",
                     cure="Cut out what is not zero, and interpolate it to even pixels.",
                 )
@@ -326,7 +326,8 @@ class StressProfile:
                 object.__setattr__(self, name, values)
                 if values.size != self.r.size:
                     raise InputError(
-                        f"{name} of the stress profile has length {values.size}, r {self.r.size}."
+                        f"{name} of the stress profile has {values.size} values for "
+                        f"{self.r.size} radii."
                     )
         require_increasing("r of the stress profile", self.r)
         if self.r[0] < 0:
