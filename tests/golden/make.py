@@ -73,6 +73,7 @@ class Runs:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         unpack(folder / "files")
+        self.printed: dict[str, Any] = {}
         self._results: dict[str, dict[str, Any]] = {}
         self._found: dict[tuple[str, ...], Any] = {}
         self._question: tuple[str, ...] = ()
@@ -85,7 +86,8 @@ class Runs:
             code, out, err = self.run([*arguments, "--json"])
             if not out:
                 raise AssertionError(f"memscal {COMMANDS[name]}\n{err}")
-            printed = reduced(json.loads(out))
+            self.printed[name] = json.loads(out)
+            printed = reduced(self.printed[name])
             result = {"command": COMMANDS[name], "exit_code": code, "output": printed}
             self._results[name] = result
         return self._results[name]

@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 from golden.make import COMMANDS, OUTPUTS, SIGNATURES, Runs, differences, load, signatures
 from golden.views import VIEW_COMMANDS, VIEWS, view
+from helpers.schemas import faults
 
 TOLERANCE = 1e-6
 """Iterative solvers stop at other last digits with other processors and builds of BLAS."""
@@ -25,6 +26,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> Runs:
 def test_a_command_prints_the_golden_results(name, runs):
     changes = list(differences(load(name), runs[name], TOLERANCE, SHARE))
     assert not changes, "\n".join(changes[:20])
+    assert faults(COMMANDS[name].partition(" ")[0], runs.printed[name]) == []
 
 
 @pytest.mark.parametrize(

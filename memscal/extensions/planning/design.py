@@ -19,7 +19,7 @@ from memscal.calibration.calibrate import uncertainties
 from memscal.calibration.stages import Solution, solved
 from memscal.calibration.uncertainty import Results, input_effects
 from memscal.deconvolution.division import Method, MethodName, chosen_method
-from memscal.errors import FitError, InputError, counted
+from memscal.errors import FitError, InputError
 from memscal.estimation.bayesian import supported, weigh_departures
 from memscal.estimation.departures import ReducedScan, departure_basis
 from memscal.estimation.forward import ForwardModel
@@ -100,7 +100,7 @@ class Plan:
         require_non_negative("relative standard uncertainty of the load", self.load_uncertainty)
         if self.repeats < 1 or self.repeats != int(self.repeats):
             raise InputError(
-                f"The scan would be repeated {counted(self.repeats, 'times')}.",
+                f"The scan would be repeated {self.repeats} times.",
                 cure="Give a whole number of repeats, one or more.",
             )
         noise = self.noise if self.noise_voltage is None else self.noise_voltage
@@ -431,7 +431,7 @@ def _out_of_reach(what: str, targets: Targets, tried: list[Design]) -> FitError:
     best = max(tried, key=partial(_progress, name=name, value=targets[name]))
     goal = _in_words(name, targets[name])
     reached = _in_words(name, _reached(best, name))
-    count = counted(best.plan.repeats, "repeats")
+    count = f"{best.plan.repeats} repeats"
     if what != "repeats":
         length = best.plan.step if what == "step" else best.plan.half_range
         count = f"a {what} of {length * 1e3:.4g} mm"

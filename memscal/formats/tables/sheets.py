@@ -223,7 +223,7 @@ class FrameTable(NamedColumns):
         with _reading(f"{self._name} cannot be read"):
             values = np.asarray(unmasked(self._column(index)))
         if values.shape != (self._rows,):
-            problem = f"{self.where(item.column)} has shape {values.shape}, not ({self._rows},)."
+            problem = f"{self.where(item.column)} has shape {values.shape} in {self._rows} rows."
             raise InputError(problem, cure="Give one value for each row.")
         if values.dtype.kind in "iufb":
             return values.astype(np.float64)
