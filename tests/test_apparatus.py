@@ -210,7 +210,7 @@ def test_the_radial_profile_is_that_of_the_table_between_its_radii(apparatus):
         (RADII * 1e3, STRESS, "r reaches 12 m"),
         (RADII[::40], STRESS[::40], "every 0.8 mm, coarser"),
         (RADII[:101], STRESS[:101], "13.5% of the largest stress is left"),
-        (RADII[:-1], STRESS, "601 stresses for 600 radii"),
+        (RADII[:-1], STRESS, "differ in length: 600 and 601"),
         (RADII[::-1], STRESS, "r must increase"),
         (RADII - 1e-4, STRESS, "r begins at -0.0001 m"),
         (RADII[100:], STRESS[100:], "r begins at 0.002 m"),

@@ -134,7 +134,7 @@ def _averaged(
     averaged = (
         f"{counted(len(held), 'holds')} of {size.min()} to {size.max()} rows, the first in lines "
         f"{line[first[0]]} to {line[stop[0] - 1]}, averaged to one reading each; "
-        f"left out: {counted(left_out, 'presses')} of fewer than {_FEWEST} steady rows."
+        f"presses of fewer than {_FEWEST} steady rows left out: {left_out}."
     )
     scatters = (
         f"Within a hold the readings scatter by {reading.text(np.median(scatter))}, neighbouring "

@@ -161,7 +161,7 @@ def test_the_sweep_is_flat_about_the_rule_s_choice():
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        ({"reference": {1: 2}}, "The reference is a dict"),
+        ({"reference": {1: 2}}, "The reference is of type dict"),
         ({"reference": [None, None]}, "differ in number: 2 and 1"),
         ({"method": 3}, "cannot divide"),
         ({"method": Tikhonov}, "that is set up"),

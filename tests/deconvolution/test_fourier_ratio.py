@@ -75,7 +75,7 @@ def test_the_weakest_component_of_the_voltage_is_read_where_that_of_the_stress_i
 def test_a_profile_that_is_none_is_refused():
     with pytest.raises(InputError, match="must increase"):
         memscal.lift(R[::-1], R, SPACING, EXTENT)
-    with pytest.raises(InputError, match="values of the profile"):
+    with pytest.raises(InputError, match="differ in length"):
         memscal.lift(R, R[1:], SPACING, EXTENT)
     for extent in (SPACING / 2, 1e6 * SPACING):
         with pytest.raises(InputError, match="half side"):

@@ -69,7 +69,7 @@ def test_what_is_no_log_is_refused_and_a_short_press_is_left_out():
     columns["normal_load"][first + 3 :][columns["x"][first + 3 :] < -7.8e-3] = 0.0
     holds = found(columns)
     assert holds.first.size == PLACES.size - 1
-    assert "1 presses of fewer than 5 steady rows are left out" in holds.notes[0]
+    assert "presses of fewer than 5 steady rows left out: 1" in holds.notes[0]
     with pytest.raises(InputError, match="The log has no hold"):
         found({n: v[::40] for n, v in columns.items()})
 

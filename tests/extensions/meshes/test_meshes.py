@@ -269,7 +269,7 @@ def test_a_field_that_may_mean_several_things_is_not_guessed_at():
         (block(RADII, RADII), {"shear": "S33"}, "sections only"),
         (meshio.Mesh(section().points, [("vertex", [[0], [1]])]), {}, "a line or a point"),
         (section(radii=RADII[:3]), {}, "Only 3 nodes"),
-        (section(radii=[0.0, 1.0, 1.0 + 1e-9, 1.0 + 2e-9]), {}, "2 radii only"),
+        (section(radii=[0.0, 1.0, 1.0 + 1e-9, 1.0 + 2e-9]), {}, "too few radii: 2"),
         (meshio.Mesh(section().points[:, ::2], [("line", [[0, 1]])]), {}, "a line or a point"),
     ],
 )

@@ -157,7 +157,7 @@ def test_any_object_with_the_three_methods_is_a_kernel():
     [
         (Own(size=2.0), "transform is 2 at k = 0, not 1"),
         (Own(size=float("nan")), "transform is nan at k = 0"),
-        (561e-6, r"a float, which has no transform\(\)"),
+        (561e-6, r"of type float, without transform\(\)"),
     ],
 )
 def test_what_is_no_apparatus_function_is_refused(kernel, problem):
