@@ -21,7 +21,7 @@ from memscal.axisymmetry.hankel import (
     ring_areas,
 )
 from memscal.axisymmetry.kernels import unit_gaussian
-from memscal.errors import InputError, counted
+from memscal.errors import InputError
 from memscal.estimation.points import TANGENTIAL
 from memscal.extensions import hook
 from memscal.model.apparatus import ApparatusData, ApparatusField
@@ -393,7 +393,7 @@ class ApparatusFunction(Result, ApparatusData):
                 f"r reaches {radii[-1]:g} m.", cure="Give radii in metres, not millimetres."
             )
         if radii.size < _FEWEST_RADII:
-            raise InputError(f"A stress at {counted(radii.size, 'points')} cannot be interpolated.")
+            raise InputError(f"A stress at {radii.size} radii cannot be interpolated.")
         if not 0 <= radii[0] <= radii[1] - radii[0]:
             raise InputError(
                 f"r begins at {radii[0]:g} m.",

@@ -166,10 +166,10 @@ class ParameterSet(FrozenArrays):
         super().__post_init__()
         n = len(self.names)
         if self.units and len(self.units) != n:
-            raise InputError(f"Numbers of parameters and units differ: {n} and {len(self.units)}.")
+            raise InputError(f"{n} parameter names, but {len(self.units)} units.")
         if self.values.shape != (n,) or self.covariance.shape != (n, n):
             raise InputError(
-                f"Parameter names ({n}), {self.values.shape} values and a covariance of shape "
+                f"{n} parameter names, {self.values.shape} values and a covariance of shape "
                 f"{self.covariance.shape} do not fit together."
             )
 
