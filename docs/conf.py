@@ -5,6 +5,7 @@ and where the files are read without a build.
 """
 
 import re
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -125,8 +126,15 @@ def block_math(self: HTML5Translator, node: math_block) -> None:
     raise SkipNode
 
 
+def copy_schemas(app: Sphinx, _: Exception | None) -> None:
+    """Put the JSON Schemas of the commands beside the pages, as the package ships them."""
+    schemas = Path(memscal.__file__).with_name("cli") / "schemas"
+    shutil.copytree(schemas, Path(app.outdir) / "schemas", dirs_exist_ok=True)
+
+
 def setup(app: Sphinx) -> None:
     """Connect what stands above."""
+    app.connect("build-finished", copy_schemas)
     app.connect("sphinx-click-process-epilog", show_as_typed)
     app.connect("doctree-resolved", add_titles)
     app.add_html_math_renderer("mathml", (inline_math, None), (block_math, None))

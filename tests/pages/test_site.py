@@ -73,6 +73,12 @@ def test_commands_are_shown_as_they_are_typed(site):
     assert len(typed) > 100
     assert [line for line in typed if re.search("[\N{EN DASH}\N{EM DASH}‘’“”]", line)] == []
     assert all(shlex.split(line, comments=True) for line in typed)
+    for path in site.rglob("*.html"):
+        text = unescape(re.sub("<[^>]+>", "", path.read_text(encoding="utf-8")))
+        assert re.findall("(?<![\\w])[\N{EN DASH}\N{EM DASH}][a-z]", text) == [], path
     commands = (site / "docs" / "commands.html").read_text(encoding="utf-8")
     assert 'class="pre">--young-modulus-uncertainty<' in commands
+    schemas = re.findall(r'href="\.\./(schemas/\w+\.json)"', commands)
+    assert len(schemas) > 10
+    assert all((site / schema).is_file() for schema in schemas)
     assert "\n    --load 1 --radius 0.25" in unescape(re.sub("<[^>]+>", "", commands))
