@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 
 from memscal.errors import InputError
+from memscal.extensions import hook
 from memscal.mechanics.contact import BaseStress, Contact
 from memscal.mechanics.press_rod import press_rod
 from memscal.model.film import LINEAR, ElasticFilm
 from memscal.model.indenter import Rod
-from memscal.model.provenance import Difference, SourceFile, accepted_differences
+from memscal.model.provenance import SourceFile
 from memscal.model.quantities import Record
 from memscal.model.records import FILM, INDENTER, LOAD
 from memscal.model.scan import Scan
@@ -59,6 +60,10 @@ def at_load_of(stress: BaseStress, scan: Scan, peak: float | None) -> Scan:
     if scan.load is None and scan.normal_load is not None:
         return replace(scan, load=float(np.nanmedian(scan.normal_load)))
     return scan if scan.load else replace(scan, load=stress.load)
+
+
+Difference = tuple[str, ...]
+"""Two places, a quantity, and what each of them states of it."""
 
 
 def require_one_kind(
@@ -219,3 +224,9 @@ def stated_differences(
             sides.append(shown)
         differences.append((*places, words.strip(), *sides))
     return differences
+
+
+def accepted_differences(differences: Sequence[Difference], **words: Any) -> list[str]:
+    """Refuse what does not agree; with ``override`` return it in words, each difference once."""
+    accepted: list[str] = hook("accepted_differences")(differences, **words)
+    return accepted

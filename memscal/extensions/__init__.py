@@ -89,6 +89,7 @@ HOOKS = {
     "read_reference_mesh": "extensions.meshes.reference_mesh",
     "recipe_text": "extensions.fleet.recipe",
     "require_all_held": "extensions.recorded.presses",
+    "accepted_differences": "formats.opened",
     "table_of": "summaries.table",
     "sweep_noise": "extensions.monte_carlo.sweep",
     "with_drawn_in": "extensions.meshes.mesh_files",

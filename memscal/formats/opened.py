@@ -5,6 +5,7 @@ from os import PathLike
 from typing import Any, TypeAlias
 
 from memscal.errors import InputError, counted
+from memscal.extensions import hook
 from memscal.formats.files import FilePath
 from memscal.formats.hdf5.reader import open_hdf5
 from memscal.formats.hdf5.writer import SCHEMA_ATTRIBUTE, STRESS_SCHEMA
@@ -92,3 +93,19 @@ def listed_items(items: Any) -> list[Any]:
     if not listed:
         raise InputError("There is no scan.", cure="Give a scan, or several.")
     return listed
+
+
+def accepted_differences(
+    differences: Iterable[Sequence[str]], *, override: bool, problem: str, why: str, cure: str
+) -> list[str]:
+    """Refuse what two places state differently; with ``override`` return it in words, each once."""
+    # Two places, a quantity, and what each of them states of it.
+    unlike = list(dict.fromkeys(differences))
+    if unlike and not override:
+        raise InputError(
+            f"{problem}:{hook('table_of')(unlike)}",
+            why=why,
+            cure=f"{cure} To go on all the same, override it (override=True; --override on the "
+            "command line): that is recorded.",
+        )
+    return ["{2} {3} in {0}, {4} in {1}".format(*difference) for difference in unlike]

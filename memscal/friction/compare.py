@@ -10,6 +10,7 @@ import numpy as np
 from memscal.apparatus import ApparatusFunction, opened_apparatus
 from memscal.errors import InputError
 from memscal.estimation.points import measured_mask
+from memscal.estimation.set_up import accepted_differences
 from memscal.extensions import hook
 from memscal.formats.cache import CacheFolder
 from memscal.formats.opened import Contacts, opened_contacts
@@ -35,7 +36,7 @@ from memscal.model.arrays import Values, require_non_negative
 from memscal.model.checks import Message, override_messages
 from memscal.model.indenter import Sphere
 from memscal.model.measured_stress import MeasuredScan, MeasuredStress
-from memscal.model.provenance import accepted_alterations, accepted_differences
+from memscal.model.provenance import accepted_alterations
 from memscal.model.scan import Scan
 from memscal.model.sizes import MOST_COMPARED, MOST_COMPARED_TOGETHER, too_large
 from memscal.model.stress import StressProfile

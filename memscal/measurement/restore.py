@@ -20,7 +20,7 @@ from memscal.estimation.profile import (
     point_messages,
 )
 from memscal.estimation.residuals import FEWEST_RESIDUALS, chi_square_test, residuals_of
-from memscal.estimation.set_up import file_in_words, stated_differences
+from memscal.estimation.set_up import accepted_differences, file_in_words, stated_differences
 from memscal.formats.opened import opened_scan
 from memscal.formats.reference import read_reference
 from memscal.measurement.posterior import film_transfer, posterior_of, reach_of, sensor_changes
@@ -43,7 +43,7 @@ from memscal.model.checks import (
 )
 from memscal.model.indenter import Rod
 from memscal.model.measured_stress import MeasuredScan
-from memscal.model.provenance import accepted_alterations, accepted_differences
+from memscal.model.provenance import accepted_alterations
 from memscal.model.records import FILM, SENSOR
 from memscal.model.scan import Scan
 from memscal.model.sizes import MOST_OF_CONTACT, too_large

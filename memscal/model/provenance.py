@@ -1,13 +1,12 @@
 """Provenance of data: files that were read, processing, time."""
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from typing import Any, Self
 
 from memscal.errors import InputError
-from memscal.extensions import hook
 from memscal.model.checks import Messages
 from memscal.version import __version__
 
@@ -104,22 +103,3 @@ def timestamp() -> str:
             f"SOURCE_DATE_EPOCH is {epoch!r}, but it must be a whole number of seconds since 1970.",
             cure="Correct this environment variable, or unset it.",
         ) from error
-
-
-Difference = tuple[str, ...]
-"""Two places, a quantity, and what each of them states of it."""
-
-
-def accepted_differences(
-    differences: Sequence[Difference], *, override: bool, problem: str, why: str, cure: str
-) -> list[str]:
-    """Refuse what does not agree; with ``override`` return it in words, each difference once."""
-    unlike = list(dict.fromkeys(differences))
-    if unlike and not override:
-        raise InputError(
-            f"{problem}:{hook('table_of')(unlike)}",
-            why=why,
-            cure=f"{cure} To go on all the same, override it (override=True; --override on the "
-            "command line): that is recorded.",
-        )
-    return ["{2} {3} in {0}, {4} in {1}".format(*difference) for difference in unlike]
