@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from memscal.cli import output as out
-from memscal.cli.failures import CHECK_FAILED, DONE, failure_object
+from memscal.cli.failures import CHECK_FAILED, DONE
 from memscal.cli.import_ import convert, prepared
 from memscal.cli.options import Options
 from memscal.errors import InputError, MemscalError
@@ -94,11 +94,10 @@ def attempt_all(
             else:
                 notes += done if isinstance(done, Sequence) else getattr(done, "messages", ())
     numbers = {**counts, "read": len(jobs) - len(refused), "refused": len(refused)}
-    problems = []
-    for name, error in refused.items():
-        told = error.problem, error.why, error.cure
-        failure = failure_object(type(error).__name__, error.exit_code, *told)
-        problems.append({"path": name, **failure})
+    problems = [
+        {"path": name, "problem": error.problem, "why": error.why, "cure": error.cure}
+        for name, error in refused.items()
+    ]
     further = {"problems": problems, "notes": marked_texts(notes)}
     causes = [(name, error.problem, error.cure) for name, error in refused.items()]
     table = Table("Refused", ("input", "problem", "cure"), causes)
