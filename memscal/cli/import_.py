@@ -32,7 +32,7 @@ from memscal.cli.options import (
 )
 from memscal.extensions import hook
 from memscal.formats.files import together
-from memscal.model.checks import marked_texts
+from memscal.model.checks import import_notes, marked_texts
 from memscal.summaries.table import readable
 
 if TYPE_CHECKING:
@@ -389,13 +389,18 @@ def convert(
             write_reference(reference.profile, output, overwrite=force)
         return reference.notes
     from memscal.formats.scan import write_scan
+    from memscal.summaries.not_stated import not_stated
 
     scan = read_table(table, options)
     if output is not None:
         write_scan(scan, output, overwrite=force)
         if scan.holds is not None:
             out.write_files(out.rendered(scan.holds.plot, options["figure"] or ()), force=force)
-    return scan.messages
+    texts = [
+        f"Not stated: {row['words']:<38}{row['option']:<31}{row['cost']}"
+        for row in not_stated(scan)
+    ]
+    return [*scan.messages, *import_notes(texts)]
 
 
 def _check_usage(path: Path, kind: str, mesh: bool, options: Options) -> None:

@@ -186,6 +186,10 @@ def emit_tables(*tables: Table, answer: str = "") -> None:
     emit(text_of(answer, tables, _columns(), _in_bold if drawn else as_it_is))
 
 
+#: Lines of --brief.
+_BRIEF = 4
+
+
 def emit_result(
     result: Told,
     head: Mapping[str, Any],
@@ -203,7 +207,10 @@ def emit_result(
         values = {name: other.to_dict() for name, other in others.items()}
         emit_json({"schema_version": "1", **head, **result.to_dict(), **values})
     elif brief:
-        emit_tables(answer=result.answer())
+        kept = result.answer().split("\n")
+        while len(folded("\n".join(kept), _columns())) > _BRIEF and len(kept) > 1:
+            kept.pop()
+        emit_tables(answer="\n".join(kept))
     else:
         tables = result.tables()
         for other in others.values():

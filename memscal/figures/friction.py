@@ -39,7 +39,7 @@ from memscal.figures.style import (
     mark,
     panels_of,
 )
-from memscal.friction.results import BoundedEstimate, FrictionComparison
+from memscal.friction.results import UNEXPLAINED, BoundedEstimate, FrictionComparison
 from memscal.model.arrays import FloatArray, Values
 
 RISE = r"$-2\,\ln(p/p_{max})$"
@@ -213,6 +213,8 @@ def _draw_effective(axes: Axes, comparison: FrictionComparison, loads: Loads) ->
             _draw_reading(axes, getattr(at_load, name), x, words if i == 0 else "", look)
     joint = joint_estimate(comparison, loads)
     label = "all loads, 95 %"
+    if joint.kind == UNEXPLAINED:
+        label = "all loads: none explains them"
     axes.axhspan(*interval_ends(joint), color=REFERENCE, alpha=0.18, lw=0, label=label)
     if joint.value is not None:
         axes.axhline(float(friction_position(joint.value)), color=REFERENCE, lw=0.8)

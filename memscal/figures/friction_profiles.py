@@ -26,7 +26,12 @@ from memscal.figures.style import (
     panels_of,
 )
 from memscal.friction.family import FRICTION_SCALE, bounded
-from memscal.friction.results import BoundedEstimate, FrictionComparison, LoadComparison
+from memscal.friction.results import (
+    UNEXPLAINED,
+    BoundedEstimate,
+    FrictionComparison,
+    LoadComparison,
+)
 from memscal.model.arrays import FloatArray
 from memscal.model.quantities import KPA, MM
 
@@ -174,6 +179,8 @@ def draw_profiles(
     looks = comparison_looks(comparison)
     joint = joint_estimate(comparison, loads)
     words = "most likely" if joint.value is None else "fitted"
+    if joint.kind == UNEXPLAINED:
+        words = "rejected"
     styles = {
         "-": rf"$\mu_e$ = {friction_name(joint.best)} ({words})",
         ":": rf"$\mu$ = {friction_name(comparison.friction[0])}",

@@ -13,7 +13,7 @@ from memscal.errors import InputError
 from memscal.friction.family import FamilySetup, ProfileFamily, parameter_values, require_loads
 from memscal.model.arrays import FloatArray
 from memscal.model.film import ElasticFilm
-from memscal.model.indenter import Indenter
+from memscal.model.indenter import Sphere
 from memscal.model.stress import StressProfile
 
 FRICTIONS = (0.0, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.6, 1.0, math.inf)
@@ -22,7 +22,7 @@ FRICTIONS = (0.0, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.6, 1.0, math.inf)
 
 def amontons_family(
     film: ElasticFilm,
-    indenter: Indenter,
+    indenter: Sphere,
     loads: ArrayLike,  # (L,), in N
     *,
     friction: Sequence[float] = FRICTIONS,
@@ -44,8 +44,6 @@ _SAME_LOAD = 0.01
 _DECAYED = 1e-3
 #: A table's force must be its load but for this share.
 _CARRIES = 0.05
-#: Missing tables that an error names.
-_MOST_NAMED = 6
 _Table = tuple[float, StressProfile]  # with its friction coefficient first
 
 
@@ -54,7 +52,7 @@ def external_family(
     loads: ArrayLike,
     *,
     film: ElasticFilm,
-    indenter: Indenter,
+    indenter: Sphere,
     reach: float,
     **options: Any,
 ) -> ProfileFamily:
@@ -123,12 +121,9 @@ def _grid(
                 row.append(nearest)
         grid.append(row)
     if missing:
-        listed = missing[:_MOST_NAMED]
-        if len(missing) > _MOST_NAMED:
-            listed.append(f"and {len(missing) - _MOST_NAMED} more")
         stated = ", ".join(f"{load:g}" for load in sorted({table.load for _, table in tables}))
         raise InputError(
-            f"No table was given for {'; '.join(listed)}.",
+            f"No table was given for {'; '.join(missing)}.",
             why=f"The tables are for {stated} N; a load must be within {_SAME_LOAD:.0%} of one of "
             "them, because a sphere's stress is not proportional to its load.",
             cure="Calculate the missing ones, or leave out the friction coefficients or loads "

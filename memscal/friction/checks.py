@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 import numpy as np
 from scipy.special import chdtrc
 
-from memscal.friction.effective import EXPANDED, HALF_NORMAL_MEAN
+from memscal.friction.effective import HALF_NORMAL_MEAN
 from memscal.friction.family import ProfileFamily
 from memscal.friction.likelihood import LUBRICATED_FRICTION
 from memscal.friction.results import BoundedEstimate, ByLoading, Joint, LoadComparison
@@ -106,21 +106,18 @@ def comparison_messages(
     families: Mapping[str, ProfileFamily],
     joint: Joint,
     checks: tuple[QualityCheck, ...],
-    macroscopic: tuple[float, float | None] | None,
 ) -> tuple[Message, ...]:
     """Return the messages of a comparison and of its measured stress, failed checks first."""
     messages = [
         *quality.failed_check_messages(checks),
         *synthetic_messages(measured),
         *_loadings(joint),
-        *_against_macroscopic(joint, macroscopic),
     ]
-    for loading, family in families.items():
+    for family in families.values():
         worst = np.nanmax(family.convergence, initial=0.0)
         if worst > _COARSE:
-            words = f" ({loading} loading)" if loading else ""
-            text = f"contacts{words} have converged to {worst:.1%} of their stress only."
-            messages.append(Message("convergence", f"The calculated {text}"))
+            text = f"The calculated contacts have converged to {worst:.1%} of their stress only."
+            messages.append(Message("convergence", text))
         messages += [Message("calculated", text) for text in family.notes]
     # All scans are of one film and one sphere.
     film = measured.scans[0].film
@@ -150,50 +147,12 @@ _LARGE_SHARE = 1 / math.sqrt(13)
 def _loadings(joint: Joint) -> Iterator[Message]:
     """Say where the definitions of the loading disagree."""
     for lubrication, by_loading in joint.items():
-        if not {"incremental", "total"} <= by_loading.keys():
-            continue
-        first = by_loading["incremental"]
-        second = by_loading["total"]
-        loads = f"{lubrication} loads".strip()
-        apart = first.budget.get("loading")
-        if apart is None:
-            # A bound and a value agree where the intervals have values in common.
-            above = first.interval.low > second.interval.upper
-            below = first.interval.upper < second.interval.low
-            disagree = above or below
-            difference = f": {first} by incremental loading, {second} by total loading"
-        else:
-            disagree = apart > _LARGE_SHARE * (first.standard_uncertainty or math.inf)
-            ends = math.sqrt(12) * apart
-            difference = f" by {ends:.2g}, more than one standard uncertainty: its middle is given"
-        if disagree:
-            yield Message(
-                "loading", f"The definitions of the loading disagree for the {loads}{difference}."
+        first, *_ = by_loading.values()
+        apart = first.budget.get("loading", 0.0)
+        if apart > _LARGE_SHARE * (first.standard_uncertainty or math.inf):
+            text = (
+                f"The definitions of the loading disagree ({lubrication or 'all'} loads) by "
+                f"{math.sqrt(12) * apart:.2g}, more than one standard uncertainty: its middle is "
+                "given."
             )
-
-
-def _against_macroscopic(
-    joint: Joint,
-    macroscopic: tuple[float, float | None] | None,
-) -> Iterator[Message]:
-    """Say how the effective coefficients stand against the macroscopic one."""
-    if macroscopic is None:
-        return
-    value, u = macroscopic
-    spread = EXPANDED * (u or 0.0)
-    for lubrication, by_loading in joint.items():
-        if lubrication == "lubricated":
-            continue
-        for loading, joint_estimate in by_loading.items():
-            interval = joint_estimate.interval
-            if value + spread < interval.low:
-                verdict = "is larger than the macroscopic one"
-            elif value - spread > interval.upper:
-                verdict = "is smaller than the macroscopic one"
-            elif interval.high is None:
-                verdict = "has no upper bound, so that it does not contradict the macroscopic one"
-            else:
-                verdict = "agrees with the macroscopic one"
-            words = f" ({loading} loading)" if loading else ""
-            text = f"The effective friction coefficient{words} {verdict}, {value:.3g}."
-            yield Message("macroscopic", text)
+            yield Message("loading", text)

@@ -17,7 +17,13 @@ from memscal.formats.opened import Contacts, opened_contacts
 from memscal.friction.calculated import FRICTIONS, amontons_family, external_family
 from memscal.friction.checks import comparison_checks, comparison_messages, synthetic_messages
 from memscal.friction.dry_against_lubricated import dry_against_lubricated, lubricated_pairs
-from memscal.friction.effective import FrictionFit, fit_friction, load_comparison, with_loading
+from memscal.friction.effective import (
+    FrictionFit,
+    fit_friction,
+    fit_together,
+    load_comparison,
+    with_loading,
+)
 from memscal.friction.family import ProfileFamily
 from memscal.friction.likelihood import (
     BETWEEN_SCAN_GAIN,
@@ -27,7 +33,7 @@ from memscal.friction.likelihood import (
     require_line,
     sensor_of,
 )
-from memscal.friction.results import FrictionComparison, Joint, LoadComparison
+from memscal.friction.results import FrictionComparison, LoadComparison
 from memscal.measurement.measure_stress import joined_stress, measure_stress
 from memscal.measurement.posterior import common_inputs
 from memscal.measurement.restore import accept_other_sensor, load_of, single_loads
@@ -229,11 +235,9 @@ def compare(
         problem = f"Lubricated loads cannot be fitted {lubricated!r}."
         raise InputError(problem, cure=f"Give {FRICTIONLESS!r} or {APART!r}, or leave it out.")
     if lubricated and lubricated_friction not in (0.0, LUBRICATED_FRICTION):
-        problem = (
-            f"Lubricated loads are to be fitted {lubricated!r}, and with a friction of their own."
-        )
         raise InputError(
-            problem, cure="Leave out lubricated (--lubricated), or lubricated_friction."
+            f"Lubricated loads are to be fitted {lubricated!r}, and with a friction of their own.",
+            cure="Leave out lubricated (--lubricated), or lubricated_friction.",
         )
     require_non_negative("friction of lubricated loads", lubricated_friction)
     require_non_negative("gain between scans", between_scan_gain)
@@ -303,12 +307,9 @@ def _require_macroscopic(
     if uncertainty is not None:
         require_non_negative("uncertainty of the macroscopic coefficient", uncertainty)
     if value is None and (interface or uncertainty is not None):
-        why = "Its uncertainty has no use without it."
-        if interface:
-            why = "Laws of the interface are weighed at it."
         raise InputError(
             "The macroscopic friction coefficient is not given.",
-            why=why,
+            why="Its uncertainty is of no use alone, and laws of the interface are weighed at it.",
             cure="Give macroscopic, such as from a measurement of sliding.",
         )
 
@@ -449,7 +450,7 @@ def compare_measured(
         dry_against_lubricated=tuple(differences),
         macroscopic=macroscopic,
         checks=checks,
-        messages=comparison_messages(measured, families, joint, checks, macroscopic),
+        messages=comparison_messages(measured, families, joint, checks),
         shear=shear,
     )
 
@@ -477,38 +478,18 @@ def _loads(
 ) -> dict[str, tuple[LoadComparison, ...]]:
     """Compare each load by each loading; its coefficients are the middle of both."""
     loads = []
+    tested = measured.noise_stated
     for i, profile in enumerate(measured.profiles):
         by_loading = {loading: load_comparison(profile, fit, i) for loading, fit in fits.items()}
-        maxima = with_loading({loading: load.by_maximum for loading, load in by_loading.items()})
-        profiles = with_loading({loading: load.by_profile for loading, load in by_loading.items()})
+        maxima = {loading: load.by_maximum for loading, load in by_loading.items()}
+        maxima = with_loading(maxima, tested=tested)
+        profiles = {loading: load.by_profile for loading, load in by_loading.items()}
+        profiles = with_loading(profiles, tested=tested)
         for loading, load in by_loading.items():
             by_maximum = maxima[loading]
             by_loading[loading] = replace(load, by_maximum=by_maximum, by_profile=profiles[loading])
         loads.append(by_loading)
     return {loading: tuple(load[loading] for load in loads) for loading in fits}
-
-
-def fit_together(
-    measured: MeasuredStress,
-    fits: Mapping[str, FrictionFit],
-    lubricated_friction: float | None = None,
-) -> Joint:
-    """Fit all loads of a kind; the dry beside lubricated ones of about that friction, if any."""
-    indices: dict[str, list[int]] = {}
-    for i, profile in enumerate(measured.profiles):
-        indices.setdefault(profile.lubrication, []).append(i)
-    joint = {
-        lubrication: {loading: fit.coefficient(chosen) for loading, fit in fits.items()}
-        for lubrication, chosen in indices.items()
-    }
-    held = indices.pop("lubricated", [])
-    first = next(iter(fits.values())).channel.family.values[0]
-    if held and lubricated_friction is not None and first == 0:
-        for lubrication, chosen in indices.items():
-            for loading, fit in fits.items():
-                estimate = fit.coefficient_beside(chosen, held, lubricated_friction)
-                joint[lubrication][loading] = estimate
-    return {lubrication: with_loading(by_loading) for lubrication, by_loading in joint.items()}
 
 
 def _compared_by_shear(
@@ -528,7 +509,7 @@ def _compared_by_shear(
     loads = []
     for i in range(len(measured.profiles)):
         by_loading = {loading: fit.coefficient([i]) for loading, fit in fits.items()}
-        loads.append(with_loading(by_loading))
+        loads.append(with_loading(by_loading, tested=measured.noise_stated))
     return FrictionComparison(
         measured=measured,
         friction=next(iter(families.values())).values,

@@ -17,9 +17,10 @@ from memscal.friction.likelihood import (
     points_at,
     predict,
 )
-from memscal.friction.results import BoundedEstimate, ByLoading, LoadComparison
+from memscal.friction.results import BoundedEstimate, ByLoading, Interval, Joint, LoadComparison
 from memscal.model.arrays import FloatArray, Values, array_record
-from memscal.model.measured_stress import MeasuredProfile
+from memscal.model.checks import FALSE_ALARM
+from memscal.model.measured_stress import MeasuredProfile, MeasuredStress
 
 EXPANDED = 1.96
 """Coverage factor of 95 %."""
@@ -182,9 +183,23 @@ def random_uncertainty(budget: Mapping[str, float]) -> float:
     return math.hypot(*parts)
 
 
-def with_loading(by_loading: ByLoading) -> dict[str, BoundedEstimate]:
-    """Take the middle of both loadings; a rectangle between them, width / sqrt(12), is left."""
+def with_loading(by_loading: ByLoading, *, tested: bool) -> dict[str, BoundedEstimate]:
+    """Take the middle of both loadings; a rectangle between them, width / sqrt(12), is left.
+
+    Where neither passes the chi-square, if it tests anything, nothing is left.
+    """
     estimates = list(by_loading.values())
+    if tested and max(estimate.p_value for estimate in estimates) < FALSE_ALARM:
+        return {
+            loading: replace(
+                estimate,
+                value=None,
+                standard_uncertainty=None,
+                interval=Interval(math.nan, math.nan),
+                reason="No friction coefficient explains these profiles.",
+            )
+            for loading, estimate in by_loading.items()
+        }
     values = [estimate.value for estimate in estimates if estimate.value is not None]
     if len(values) < 2:
         return dict(by_loading)
@@ -207,6 +222,30 @@ def with_loading(by_loading: ByLoading) -> dict[str, BoundedEstimate]:
         "by_lubricated": widest.by_lubricated,
     }
     return {loading: replace(estimate, **counted) for loading, estimate in by_loading.items()}
+
+
+def fit_together(
+    measured: MeasuredStress,
+    fits: Mapping[str, FrictionFit],
+    lubricated_friction: float | None = None,
+) -> Joint:
+    """Fit all loads of a kind; the dry beside lubricated ones of about that friction, if any."""
+    indices: dict[str, list[int]] = {}
+    for i, profile in enumerate(measured.profiles):
+        indices.setdefault(profile.lubrication, []).append(i)
+    joint = {
+        lubrication: {loading: fit.coefficient(chosen) for loading, fit in fits.items()}
+        for lubrication, chosen in indices.items()
+    }
+    held = indices.pop("lubricated", [])
+    first = next(iter(fits.values())).channel.family.values[0]
+    if held and lubricated_friction is not None and first == 0:
+        for lubrication, chosen in indices.items():
+            for loading, fit in fits.items():
+                estimate = fit.coefficient_beside(chosen, held, lubricated_friction)
+                joint[lubrication][loading] = estimate
+    tested = measured.noise_stated
+    return {kind: with_loading(held, tested=tested) for kind, held in joint.items()}
 
 
 def load_comparison(profile: MeasuredProfile, fit: FrictionFit, index: int) -> LoadComparison:

@@ -67,13 +67,10 @@ def friction_reason(interval: Interval, last: float) -> str:
     if interval.high is not None:
         return ""
     end = "full stick" if np.isinf(last) else f"{last:.3g}, the last one calculated,"
-    if interval.low <= 0:
-        return (
-            f"The friction coefficient is not identifiable: no friction and {end} agree with the "
-            "data equally well."
-        )
-    bound = format_bound(interval.low, upper=False)
+    above = ""
+    if interval.low > 0:
+        above = f" above {format_bound(interval.low, upper=False)}, a lower bound"
     return (
-        f"The friction coefficient is not identifiable above {bound}: every larger one, {end} "
-        "included, agrees with the data as well. This is a lower bound."
+        f"The friction coefficient is not identifiable{above}: every larger one, {end} included, "
+        "agrees with the data as well."
     )

@@ -26,12 +26,8 @@ INTERVAL = "interval"
 LOWER_BOUND = "lower bound"
 UPPER_BOUND = "upper bound"
 UNKNOWN = "unknown"
+UNEXPLAINED = "none explains it"
 """What data tell about a parameter; an interval is that of a parameter without a best value."""
-
-
-def percent(share: float) -> str:
-    """Return a share in percent, with the space of ISO 80000: ``95 %``."""
-    return f"{100 * share:.3g} %"
 
 
 @value_record
@@ -39,7 +35,7 @@ class Interval:
     """A confidence interval of a parameter that is not negative and may have no upper end.
 
     ``low`` is 0 where the data do not exclude it, ``high`` ``None`` where they exclude no large
-    value.
+    value.  Neither is a number where no value explains the data.
 
     >>> print(Interval(0.12, None))
     [0.12, ∞] (95 %)
@@ -51,8 +47,7 @@ class Interval:
 
     def __str__(self) -> str:
         """Return both ends and the level."""
-        high = "∞" if self.high is None else f"{self.high:.3g}"
-        return f"[{self.low:.3g}, {high}] ({percent(self.level)})"
+        return f"[{self.low:.3g}, {self.upper:.3g}] ({100 * self.level:.3g} %)".replace("inf", "∞")
 
     @property
     def upper(self) -> float:
@@ -112,7 +107,9 @@ class BoundedEstimate:
 
     @property
     def kind(self) -> str:
-        """What the data tell: value, interval without a value, lower or upper bound, or unknown."""
+        """What the data tell: value, interval without a value, lower or upper bound, or nothing."""
+        if math.isnan(self.interval.low):
+            return UNEXPLAINED
         if self.interval.high is None:
             return LOWER_BOUND if self.interval.low > 0 else UNKNOWN
         if self.interval.low <= 0 and (self.value is None or self.value <= 0):
@@ -122,6 +119,8 @@ class BoundedEstimate:
     def __str__(self) -> str:
         """Return the value with its interval, or the bound that is left of it."""
         kind = self.kind
+        if kind == UNEXPLAINED:
+            return kind
         if kind == UNKNOWN:
             return "not identifiable"
         scale = _UM if self.unit else 1.0
@@ -130,7 +129,7 @@ class BoundedEstimate:
         high = self.interval.upper / scale
         if kind == VALUE and self.value is not None:
             return _rounded(self.value / scale, low, high) + tail
-        tail += f" ({percent(self.interval.level)})"
+        tail += f" ({100 * self.interval.level:.3g} %)"
         lower = format_bound(low, upper=False)
         if kind == LOWER_BOUND:
             return f"above {lower}{tail}"
@@ -297,6 +296,12 @@ class FrictionComparison(Shown, Tabulated, Correlated, Checked):
     def __repr__(self) -> str:
         """Return the main numbers in place of thousands of array elements."""
         return f"<FrictionComparison: {joint_text(self.joint)}; {state_of_checks(self.checks)}>"
+
+    @property
+    def unexplained(self) -> list[str]:
+        """Lubrications whose loads no friction coefficient explains."""
+        first = self.loadings[0]
+        return [name for name, by in self.joint.items() if by[first].kind == UNEXPLAINED]
 
     @property
     def loadings(self) -> tuple[str, ...]:

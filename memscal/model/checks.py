@@ -169,7 +169,7 @@ class QualityCheck:
     @property
     def kind(self) -> str:
         """The name without the number of a profile."""
-        return self.name.rstrip("0123456789").rstrip("_")
+        return self.name.rstrip("_0123456789")
 
     @property
     def profile(self) -> str:
@@ -260,8 +260,7 @@ def failed_check_messages(checks: Iterable[QualityCheck]) -> list[Message]:
 def uncertainty_unstated_messages(uncertainties: Mapping[str, float | None]) -> list[Message]:
     """Return one message that names the inputs without an uncertainty, if there are any."""
     names = [name for name, value in uncertainties.items() if value is None]
-    it = "it" if len(names) == 1 else "them"
-    text = f"No uncertainty is stated for {', '.join(names)}: nothing is counted for {it}."
+    text = f"No uncertainty is stated for {', '.join(names)}: none is counted."
     return [Message("uncertainty_unstated", text)] if names else []
 
 
@@ -272,8 +271,8 @@ def override_messages(differences: Iterable[str]) -> list[Message]:
 
 def at_ceiling_text(number: int) -> str:
     """Say how many readings at a ceiling are left out."""
-    are = "reading at the ceiling is" if number == 1 else "readings at the ceiling are"
-    return f"{number} {are} left out."
+    reading = f"reading{'' if number == 1 else 's'}"
+    return f"{number} {reading} at the ceiling {'is' if number == 1 else 'are'} left out."
 
 
 def import_notes(texts: Iterable[str]) -> list[Message]:

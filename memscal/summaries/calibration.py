@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from memscal.calibration.calibrate import Calibration
-from memscal.calibration.explanations import DEPARTURE, explanation, misfit
+from memscal.calibration.explanations import DEPARTURE, OF_GAUSSIAN, explanation, misfit
 from memscal.calibration.stages import Misfit
 from memscal.estimation.points import MINIMUM_POSITIONS, ScanPoints, loads_differ
 from memscal.mechanics.contact import Contact
@@ -88,15 +88,18 @@ def answer(result: Calibrated) -> str:
     failed = [check.kind for check in apparatus.checks if not check.passed]
     if failed and not misfit(apparatus.checks):
         cures = [EXPLANATIONS[kind][1] for kind in dict.fromkeys(failed) if kind in EXPLANATIONS]
-        return f"{law}A = {a}{by} is in doubt. {checks}\nWhat to do: {'; '.join(cures)}."
+        return f"A = {a}{by} is in doubt. {checks}\nWhat to do: {'; '.join(cures)}.{law}"
     if not failed:
         sigma = measured_text(apparatus.parameters, "gaussian_sigma")
         suffices = f"Its Gaussian of σ = {sigma} suffices: the scan shows no departure."
-        return f"{law}Use A = {a}{by}. {checks}\n{suffices}"
+        return f"Use A = {a}{by}. {checks}\n{suffices}{law}"
     rows = _explanations(apparatus)
     rivals = [row for row in rows if row["named"] and row["name"] != DEPARTURE]
     settled = ": which A to use is not settled" if rivals else ""
-    return f"{law}A = {a}{by} if all is as stated{settled}. {checks}\n{explanation(rows)}"
+    found = f"A = {a}{by} if all is as stated{settled}. {checks}"
+    if not rivals and set(failed) <= set(OF_GAUSSIAN):
+        found = f"Use A = {a}{by}, with the profile G(r) and not its Gaussian. {checks}"
+    return f"{found}\n{explanation(rows)}{law}"
 
 
 def _explanations(apparatus: ApparatusData) -> Sequence[Values]:
@@ -116,8 +119,8 @@ def _dominating_law(apparatus: ApparatusData) -> str:
     if not dominated:
         return ""
     return (
-        "The film's law, which is not stated, dominates the uncertainty: it makes up "
-        f"{' and '.join(dominated)}.\n"
+        "\nThe film's law, which is not stated, dominates the uncertainty: it makes up "
+        f"{' and '.join(dominated)}."
     )
 
 

@@ -11,13 +11,13 @@ from memscal.friction.family import FRICTION_SCALE, bounded
 from memscal.friction.results import (
     INTERVAL,
     LOWER_BOUND,
+    UNEXPLAINED,
     UNKNOWN,
     UPPER_BOUND,
     VALUE,
     BoundedEstimate,
     FrictionComparison,
     LoadComparison,
-    percent,
 )
 from memscal.model import records
 from memscal.model.arrays import FloatArray, Values
@@ -32,6 +32,7 @@ from memscal.summaries.table import (
     checks_json,
     checks_table,
     finite,
+    percent,
     texts_of,
     verdict,
     worst_checks,
@@ -232,7 +233,7 @@ def notes(comparison: FrictionComparison) -> Iterator[Message]:
     messages = list(comparison.messages)
     if not comparison.by_shear:
         for lubrication, loading, estimate in _joint(comparison):
-            if estimate.reason:
+            if estimate.reason and estimate.kind != UNEXPLAINED:
                 text = f"{_which(lubrication, loading)}, all loads: {estimate.reason}"
                 messages.append(Message("no_value", text[:1].upper() + text[1:]))
         messages += _about_profiles(comparison)
@@ -275,7 +276,13 @@ def answer(comparison: FrictionComparison) -> str:
     """Return the coefficients of all loads with their intervals, and how the checks stand."""
     moved = [estimate.by_lubricated for *_, estimate in _joint(comparison)]
     lines = []
+    unexplained = comparison.unexplained
+    if unexplained:
+        which = f"the {' and '.join(unexplained) or 'measured'} profiles"
+        lines.append(f"No friction coefficient explains {which}.")
     for lubrication, by_loading in comparison.joint.items():
+        if lubrication in unexplained:
+            continue
         estimates = list(by_loading.values())
         loadings: dict[str, str] = {}
         for loading, estimate in by_loading.items():
@@ -303,9 +310,6 @@ def answer(comparison: FrictionComparison) -> str:
 
 
 _LABELS = ("", "state", "load (N)")
-#: From here on chi-square is written without a decimal, and as a power of ten.
-_WIDE = 100
-_LONG = 1e5
 
 
 def tables(comparison: FrictionComparison) -> list[Table]:
@@ -313,12 +317,10 @@ def tables(comparison: FrictionComparison) -> list[Table]:
     friction = [_friction_table(comparison, loading) for loading in comparison.loadings]
     if comparison.by_shear:
         return [*friction, _budget_table(comparison)]
-    likelihoods = [_likelihood_table(comparison, loading) for loading in comparison.loadings]
     laws = comparison.interface
     return [
         _maxima_table(comparison),
         *friction,
-        *likelihoods,
         _budget_table(comparison),
         _macroscopic_table(comparison),
         _lubrication_table(comparison),
@@ -398,28 +400,6 @@ def _fit(comparison: FrictionComparison, estimate: BoundedEstimate) -> tuple[str
     return f"{estimate.least / estimate.degrees:.2f}", f"{estimate.p_value:.2g}"
 
 
-def _likelihood_table(comparison: FrictionComparison, loading: str) -> Table:
-    """Return what each load says of each calculated profile."""
-    way = f"{loading} loading" if loading else "profiles as given"
-    rows = []
-    for i, load in enumerate(comparison.loads[loading], start=1):
-        rises = [_short(rise) for rise in load.deviance.tolist()]
-        rows.append([*_labels(i, load.profile), f"{load.degrees}", *rises])
-    names = [friction_name(mu) for mu in comparison.friction.tolist()]
-    head = [*_LABELS, "ν", *names]
-    title = f"-2 ln(p/p_max) of each profile by friction coefficient, {way}"
-    return Table(title, head, rows, labels=len(_LABELS))
-
-
-def _short(value: float) -> str:
-    """Return a rise of -2 ln p in few characters."""
-    if not math.isfinite(value):
-        return "-"
-    if value >= _LONG:
-        return f"{value:.0e}".replace("e+0", "e")
-    return f"{value:.1f}" if value < _WIDE else f"{value:.0f}"
-
-
 def _budget_table(comparison: FrictionComparison) -> Table:
     """Return the contribution of each source to each coefficient."""
     shown = {}
@@ -457,6 +437,8 @@ def _macroscopic_table(comparison: FrictionComparison) -> Table:
     rows = []
     for lubrication, loading, joint in _joint(comparison):
         place = "within"
+        if joint.kind == UNEXPLAINED:
+            continue
         if not joint.interval.holds(value):
             place = "below" if value < joint.interval.low else "above"
         interval = f"{place} the {percent(joint.interval.level)} interval"

@@ -50,6 +50,11 @@ def finite(value: float | None) -> float | None:
     return float(value) if value is not None and math.isfinite(value) else None
 
 
+def percent(share: float) -> str:
+    """Return a share in percent, with the space of ISO 80000: ``95 %``."""
+    return f"{100 * share:.3g} %"
+
+
 def stated_text(value: object) -> str:
     """Return an option's value for reading: groups as "name: value", not as Python."""
     if isinstance(value, Mapping):
@@ -102,12 +107,18 @@ def checks_table(checks: Sequence[QualityCheck], *, meanings: bool = False) -> T
     return Table(CHECKS, head, rows, failed)
 
 
+#: Kinds of failed checks that a sentence names.
+_NAMED = 4
+
+
 def verdict(checks: Sequence[QualityCheck]) -> str:
     """Return as a sentence how many checks passed, and the kinds of those that failed."""
     failed = [check.kind.replace("_", " ") for check in checks if not check.passed]
     if not failed:
         return f"All {len(checks)} checks passed." if checks else ""
-    return f"{len(failed)} of {len(checks)} checks FAILED: {', '.join(dict.fromkeys(failed))}."
+    kinds = [*dict.fromkeys(failed)]
+    named = f"{', '.join(kinds[:_NAMED])}{', and others' if len(kinds) > _NAMED else ''}"
+    return f"{len(failed)} of {len(checks)} checks FAILED: {named}."
 
 
 def checks_json(checks: Sequence[QualityCheck]) -> list[dict[str, Any]]:

@@ -23,8 +23,8 @@ from memscal import FrictionComparison
 from memscal.extensions.simulation.contact_scan import PAPER_LOADS, PAPER_SPHERE
 from memscal.extensions.simulation.rod_scan import PAPER_FILM
 from memscal.friction.calculated import amontons_family
-from memscal.friction.compare import channels_of, compare_measured, fit_together
-from memscal.friction.effective import fit_friction
+from memscal.friction.compare import channels_of, compare_measured
+from memscal.friction.effective import fit_friction, fit_together
 
 SEEDS = 400 if FULL else 12
 FEW = 50 if FULL else 3  # of coefficients that no interval is counted at

@@ -10,6 +10,7 @@ from helpers.scans import LINEAR_FILM, simulated
 
 import memscal
 from memscal.calibration.explanations import DEPARTURE, explanation
+from memscal.cli.output import emit_result
 
 
 @pytest.fixture(scope="module")
@@ -81,3 +82,29 @@ def row(name, named=True):
 def test_the_sentence_says_what_is_as_good(rows, text):
     assert text in explanation(rows)
     assert explanation(rows).endswith("or by a cause that is not listed.")
+
+
+def with_failed(apparatus, *names):
+    checks = [replace(check, passed=check.name not in names) for check in apparatus.checks]
+    return replace(apparatus, checks=tuple(checks))
+
+
+def test_use_a_is_said_only_where_no_check_of_a_or_g_failed():
+    good = memscal.calibrate(simulated(seed=3, load=0.05)).apparatus
+    assert len(good.checks) > 15
+    for check in good.checks:
+        doubtful = with_failed(good, check.name)
+        of_gaussian = check.name in ("gaussian_misfit", "gaussian_evidence")
+        for page in (doubtful.summary(), doubtful._repr_html_(), doubtful.report()):
+            assert ("Use A = " in page) == of_gaussian, check.name
+        assert doubtful.answer().startswith("Use A = " if of_gaussian else "A = ")
+
+
+def test_a_brief_answer_has_four_lines_whatever_failed(capsys):
+    good = memscal.calibrate(simulated(seed=3, load=0.05)).apparatus
+    worst = with_failed(good, *(check.name for check in good.checks))
+    emit_result(worst, {}, as_json=False, brief=True)
+    lines = capsys.readouterr().out.splitlines()
+    assert 1 < len(lines) <= 4
+    assert lines[0].startswith("A = ")
+    assert "checks FAILED" in " ".join(lines)

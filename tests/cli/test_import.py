@@ -42,3 +42,18 @@ def test_a_depth_tells_the_presses_and_is_not_kept(run):
     run(*told.split()).exits(2)
     run(*told.split(), "--holds").exits(0)
     assert gaussian().normal_load is None
+
+
+@pytest.mark.usefixtures("folder")
+def test_an_import_ends_with_what_is_not_stated(run):
+    write_log("F [N]")
+    told = run("import", "log.csv", "-o", "scan.h5", *OPTIONS.split()).exits(0).out.splitlines()
+    last = [line for line in told if line.startswith("Not stated: ")]
+    assert told[-len(last) :] == last
+    options = [line.split("--")[1].split()[0] for line in last]
+    assert {"gain-uncertainty", "position-scale-uncertainty", "film-law"} < {*options}
+    stated = ["--film-law", "linear", "--gain-uncertainty", "0.5", "--force"]
+    told = run("import", "log.csv", "-o", "scan.h5", *OPTIONS.split(), *stated).exits(0).out
+    assert "--film-law" not in told
+    assert "--gain-uncertainty" not in told
+    assert "--load-uncertainty" in told

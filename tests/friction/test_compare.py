@@ -255,3 +255,19 @@ def test_an_error_of_the_film_that_sensor_and_contact_share_counts_once(made, ap
     assert np.abs(change - truth[0]).max() < 0.1 * np.abs(truth).max()
     # Of another film, each has its own.
     assert not sensor_of(apparatus, family, 8e-3, [replace(made.dry, film=thick)]).shared
+
+
+def test_where_no_coefficient_explains_the_profiles_there_is_no_interval(made, apparatus, kept):
+    sphere = replace(made.dry.indenter, radius=2 * made.dry.indenter.radius)
+    wrong = [replace(scan, indenter=sphere) for scan in (made.dry, made.lubricated)]
+    found = memscal.compare(
+        wrong, apparatus, friction=FRICTION, loading="incremental", override=True, cache=kept
+    )
+    assert "joint_chi_square_dry" in failed(found)
+    assert found.answer().startswith("No friction coefficient explains the dry")
+    for joint in found.to_dict()["joint"]:
+        if joint["lubrication"] == "dry":
+            assert joint["interval"]["low"] is joint["interval"]["high"] is joint["value"] is None
+            assert "No friction coefficient" in joint["reason"]
+    labels = found.plot().axes[-1].get_legend_handles_labels()[1]
+    assert "all loads: none explains them" in labels

@@ -58,7 +58,7 @@ def test_chi_square_is_as_large_as_its_degrees_say():
 
 def test_of_two_loadings_the_middle_is_the_value_and_a_rectangle_is_left():
     ends = {"incremental": found(0.1)[0], "total": found(0.2)[0]}
-    both = with_loading(ends)
+    both = with_loading(ends, tested=True)
     low, high = (end.value for end in ends.values())
     apart = (high - low) / np.sqrt(12)
     for each in both.values():
@@ -67,4 +67,4 @@ def test_of_two_loadings_the_middle_is_the_value_and_a_rectangle_is_left():
         assert np.hypot.reduce(list(each.budget.values())) == pytest.approx(
             each.standard_uncertainty
         )
-    assert with_loading({"total": ends["total"]}) == {"total": ends["total"]}
+    assert with_loading({"total": ends["total"]}, tested=True) == {"total": ends["total"]}

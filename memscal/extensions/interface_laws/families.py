@@ -13,7 +13,7 @@ from memscal.friction.family import FamilySetup, ProfileFamily, parameter_values
 from memscal.mechanics.interface import ExponentialCompliance, Interface
 from memscal.model.arrays import FloatArray
 from memscal.model.film import ElasticFilm
-from memscal.model.indenter import Indenter
+from memscal.model.indenter import Sphere
 from memscal.model.measured_stress import MeasuredProfile
 
 SLIP_LENGTHS = (0.0, 0.15e-6, 0.5e-6, 1.5e-6, 4e-6, 1e-5, 3e-5, 1e-4, 4e-4, math.inf)
@@ -30,7 +30,7 @@ _MEETING = 1e-6
 
 def elasto_plastic_family(
     film: ElasticFilm,
-    indenter: Indenter,
+    indenter: Sphere,
     loads: ArrayLike,
     *,
     friction: float,
@@ -66,7 +66,7 @@ def elasto_plastic_family(
 
 def normal_compliance_family(
     film: ElasticFilm,
-    indenter: Indenter,
+    indenter: Sphere,
     loads: ArrayLike,
     *,
     lengths: Sequence[float] | None = None,

@@ -1,13 +1,13 @@
 """Laws of the interface and their evidence, as tables and as JSON."""
 
 from memscal.extensions.interface_laws import results
-from memscal.friction.results import INTERVAL, VALUE, percent
+from memscal.friction.results import INTERVAL, VALUE
 from memscal.model.arrays import FloatArray, Values
 from memscal.model.quantities import KPA, Quantity
 from memscal.model.records import ESTIMATE_FIT, SLIP_LENGTH
 from memscal.summaries.comparison import bounded_json, friction_name
 from memscal.summaries.declared import members, plain
-from memscal.summaries.table import Table, texts_of
+from memscal.summaries.table import Table, percent, texts_of
 
 _LAW = ("name", "best", "log_evidence", "log_likelihood", "numerical_error")
 _FACTOR = ("favoured", "against", "log_factor", "words", "log_likelihood_ratio")

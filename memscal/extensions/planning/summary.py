@@ -3,12 +3,11 @@
 import math
 
 from memscal.extensions.planning.design import Design
-from memscal.friction.results import percent
 from memscal.model.arrays import Values
 from memscal.model.quantities import ESTIMATED, MM, MV, PER_MM, PER_MM2, Quantity, measured
 from memscal.model.records import RADIAL, TRANSFER
 from memscal.summaries import declared
-from memscal.summaries.table import Table
+from memscal.summaries.table import Table, percent
 
 PLAN = (
     Quantity("positions", "number", "positions"),
