@@ -190,8 +190,6 @@ def _step_by_step(
             error.last = walk.point() if walk.steps else None
             raise
         yield walk.point()
-        if problem.friction == 0 or problem.interface.normal_law is not None:
-            resume = walk
 
 
 def _walk_ring_by_ring(walk: _Walk, target: Target, *, rising: bool) -> _Walk:
