@@ -169,10 +169,9 @@ def base_spectrum(
 ) -> FloatArray:
     r"""Return :math:`T\hat p - N\hat q`; of ``order`` one :math:`-(S\hat p + R\hat q)`; in N."""
     x = k * film.thickness
-    nu = film.poisson_ratio
     p = traction.pressure_transform(k)
     q = traction.shear_transform(k)
-    by_pressure, by_shear = base_response(x, nu, order)
+    by_pressure, by_shear = base_response(x, film.poisson_ratio, order)
     return -(by_pressure * p + by_shear * q) if order else by_pressure * p - by_shear * q
 
 
@@ -225,11 +224,10 @@ class RingTraction:
 
     def half_space_integrals(self, r: FloatArray) -> HalfSpaceIntegrals:
         """Return the four integrals of :class:`InterfaceTraction` at ``r`` (m), in Pa m."""
-        p = self.pressures
         q = self.shears
         singular = singular_integrals(r, self.rings)
         beyond, within = coupling_integrals(r, self.rings)
-        return singular[0] @ p, beyond @ q, within @ p, singular[1] @ q
+        return singular[0] @ self.pressures, beyond @ q, within @ self.pressures, singular[1] @ q
 
     def _transform(self, values: FloatArray, k: FloatArray, order: int) -> FloatArray:
         flat = np.ravel(floats(k))
@@ -272,14 +270,13 @@ class HankelFilm:
     @cached_property
     def compliance(self) -> SurfaceCompliance:
         """Displacements of the rings under tractions on the rings."""
-        film = self.film
         r = self.r
         direct = singular_integrals(r, r)
         across = coupling_integrals(r, r)
-        k, weights = _wavenumbers(film, 2 * r[-1])
+        k, weights = _wavenumbers(self.film, 2 * r[-1])
         normal, radial = (hat_transform(r.tobytes(), k.tobytes(), order) for order in (0, 1))
         half_space = (direct[0], *across, direct[1])
-        moved = _displacements(film, r, k, weights, normal, radial, half_space)
+        moved = _displacements(self.film, r, k, weights, normal, radial, half_space)
         return SurfaceCompliance(r, np.block([[*moved[:2]], [*moved[2:]]]))
 
     discretisation = "Hankel transforms, Gauss-Legendre in k"
@@ -311,8 +308,7 @@ class HankelField:
         k, weights = _wavenumbers(self.film, x.max(initial=0.0) + traction.radius)
         p = traction.pressure_transform(k)
         q = traction.shear_transform(k)
-        half_space = traction.half_space_integrals(x)
-        displaced = _displacements(self.film, x, k, weights, p, q, half_space)
+        displaced = _displacements(self.film, x, k, weights, p, q, traction.half_space_integrals(x))
         by_pressure, by_shear = displaced[2 * order : 2 * order + 2]
         return (by_pressure + by_shear).reshape(np.shape(r))
 

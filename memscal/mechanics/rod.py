@@ -151,8 +151,7 @@ class RodTraction:
         reciprocal = np.divide(1.0, t, out=np.zeros_like(t), where=t > 0)
         w_by_q = np.sum(d_s * legendre.legval(t, odd) * reciprocal, axis=1)
         beyond = np.sum(d_s * legendre.legval(t, even), axis=1)
-        whole = legendre.legval(1.0, legendre.legint(even, lbnd=0))
-        u_by_p = (whole - beyond) * inverse
+        u_by_p = (legendre.legval(1.0, legendre.legint(even, lbnd=0)) - beyond) * inverse
         unit = self.load / (2 * np.pi * self.radius)
         return w_by_p * unit, w_by_q * unit, u_by_p * unit, u_by_q * unit
 

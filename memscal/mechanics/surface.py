@@ -108,8 +108,7 @@ def singular_integrals(x: FloatArray, rings: FloatArray) -> ArrayPair:
 def coupling_integrals(x: FloatArray, rings: FloatArray) -> ArrayPair:
     r"""Return :math:`\int_{x_i}^\infty\phi_j\,ds` and :math:`\int_0^{x_i}\phi_j\,s\,ds/x_i`."""
     starts = rings[:-1]
-    ends = rings[1:]
-    lengths = ends - starts
+    lengths = rings[1:] - starts
     reach = np.clip((x[:, None] - starts) / lengths, 0.0, 1.0)
     # Integrals of 1 - v and v, and of their products with s = start + length v, up to ``reach``.
     falling = reach - reach**2 / 2

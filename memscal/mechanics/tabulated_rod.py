@@ -44,8 +44,7 @@ class TabulatedField:
 
         # Even in k, or odd.
         ends: Any = ((2, 0.0) if order else (1, 0.0), "not-a-knot")
-        spline = CubicSpline(self.k, self.transforms[order], bc_type=ends)
-        return up_to(self.k[-1], spline, k)
+        return up_to(self.k[-1], CubicSpline(self.k, self.transforms[order], bc_type=ends), k)
 
     def base(self, r: FloatArray, order: int) -> FloatArray:
         """Return normal stress or outward traction at the base in Pa."""
@@ -160,8 +159,7 @@ def _column(poisson: float, radius: float, *, sticking: bool) -> tuple[_Rows, fl
         weights = _polynomial(tuple(ratios[chosen]), poisson)
         rows.append(weights @ [at_ratios[m] for m in chosen])
     flat: Any = ((1, np.zeros(columns.shape[-1])), "not-a-knot")
-    spline = CubicSpline(np.cbrt(depths[:count]), rows, bc_type=flat)
-    return spline, float(depths[count - 1])
+    return CubicSpline(np.cbrt(depths[:count]), rows, bc_type=flat), float(depths[count - 1])
 
 
 def _nearest(nodes: Any, place: Any) -> list[int]:
