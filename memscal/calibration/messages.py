@@ -50,22 +50,22 @@ def calibration_messages(
     yield from _unstated_load(prepared, solution)
     yield from quality.failed_check_messages(checks)
     if estimate.points.order:
-        text = (
+        yield Message(
+            "experimental",
             f"Channel {channel} is experimental: it was tested on synthetic data only. A and G are "
             "those of the shear at the base; the voltage is positive where the film pulls the "
-            f"sensor towards larger {channel[0]}."
+            f"sensor towards larger {channel[0]}.",
         )
-        yield Message("experimental", text)
     if solution.per_repeat:
         yield _centres(solution)
     offsets = [abs(scan.line_offset) for scan in solution.scans]
     if max(offsets) > 0:
         distances = " and ".join(f"{offset * 1e3:.3f} mm" for offset in offsets)
-        text = (
+        yield Message(
+            "line_offset",
             f"The lines pass the sensor's centre at {distances}, each by the centre of the line "
-            "across it: their positions are taken as those of one stage."
+            "across it: their positions are taken as those of one stage.",
         )
-        yield Message("line_offset", text)
     clipped = round(sum(scan.at_ceiling for scan in prepared.as_stated))
     if clipped:
         yield Message("at_ceiling", quality.at_ceiling_text(clipped))
@@ -82,8 +82,10 @@ def calibration_messages(
         )
         yield Message("reference", f"{text} {form.notes}".strip())
     elif not isinstance(stress, Contact) and stress.convergence is None:
-        text = "The reference states no convergence: its own error is not counted."
-        yield Message("convergence_unstated", text)
+        yield Message(
+            "convergence_unstated",
+            "The reference states no convergence: its own error is not counted.",
+        )
     if form is None:
         yield from _law(solution, results)
         yield from _unstated(solution)
@@ -92,24 +94,24 @@ def calibration_messages(
         yield Message("synthetic", "The scan is synthetic: its truth is stored in it.")
 
 
-def _unstated_load(prepared: Prepared, solution: Solution) -> list[Message]:
+def _unstated_load(prepared: Prepared, solution: Solution) -> Iterator[Message]:
     """Say what load is taken where a scan states none."""
     if all(s.load is not None or s.normal_load is not None for s in prepared.as_stated):
-        return []
+        return
     solved = prepared.request.reference is None and prepared.as_stated[0].reference is None
     if prepared.reading.per == "Pa":
-        text = (
+        yield Message(
+            "load_of_reference",
             "No load is stated: it is taken to be that of the reference, "
-            f"{solution.scan.stated_load:.4g} N (--relative takes none)."
+            f"{solution.scan.stated_load:.4g} N (--relative takes none).",
         )
     elif prepared.reading.relative and solved:
-        text = (
+        yield Message(
+            "load_of_reference",
             f"No load is stated: {solution.stress.load:.3g} N is taken, under which the shape of "
-            "the stress is calculated; of a linear film it is that of any load (--film-law linear)."
+            "the stress is calculated; of a linear film it is that of any load (--film-law "
+            "linear).",
         )
-    else:
-        return []
-    return [Message("load_of_reference", text)]
 
 
 def _centres(solution: Solution) -> Message:
@@ -122,11 +124,11 @@ def _centres(solution: Solution) -> Message:
         reason = "as their loads differ, and with them the shape of the stress"
     elif test is not None:
         reason = f"as one centre has a p-value of {test.p_value:.1g} (--centre common takes one)"
-    text = (
+    return Message(
+        quality.REPEAT_CENTRES,
         f"Each of the {owners.size} repeats has its own centre, baseline and drift, {reason}. The "
-        f"centres are up to {apart * 1e6:.3g} um apart."
+        f"centres are up to {apart * 1e6:.3g} um apart.",
     )
-    return Message(quality.REPEAT_CENTRES, text)
 
 
 def _noise(estimate: ProfileEstimate, results: Results) -> Message:
@@ -134,30 +136,30 @@ def _noise(estimate: ProfileEstimate, results: Results) -> Message:
     slow = "Its correlation is not estimated."
     if estimate.slow:
         slow = slow_noise_text(estimate, estimate.slow, results)
-    text = (
+    return Message(
+        quality.NOISE_UNSTATED,
         f"u_{points.channel}_errors is absent: a noise of "
         f"{points.reading.text(estimate.noise_scale)} "
         "was estimated from the scan's scatter, so that chi-square cannot tell noise from "
-        f"misfit of the same size, and has no p-value. {slow}"
+        f"misfit of the same size, and has no p-value. {slow}",
     )
-    return Message(quality.NOISE_UNSTATED, text)
 
 
-def _method(solution: Solution) -> list[Message]:
-    """Return where the uncertainty comes from if the method is no plain window."""
+def _method(solution: Solution) -> Iterator[Message]:
+    """Say where the uncertainty comes from if the method is no plain window."""
     method = solution.method
     if method.name in _WINDOWS:
-        return []
+        return
     how = "uncertainties are first-order through its effective window"
     if not isinstance(method, LINEAR_METHODS):
         how = "what noise adds to the uncertainties is the scatter of "
         how += f"{draw_count(solution)} draws of the voltages"
         how += " and of its own random numbers" if hasattr(method, "seed") else ""
-    return [Message("method", f"Method {method.name}: {how}. {method.fails}")]
+    yield Message("method", f"Method {method.name}: {how}. {method.fails}")
 
 
-def _form_of_g(results: Results) -> list[Message]:
-    """Return what of an uncertainty is by the prior of the form of G, which like scans share."""
+def _form_of_g(results: Results) -> Iterator[Message]:
+    """Say what of an uncertainty is by the prior of the form of G, which like scans share."""
     parts = []
     for name, words in (("conversion_constant", "A"), ("fwhm", "the full width")):
         budget = results.budget[name]
@@ -166,20 +168,20 @@ def _form_of_g(results: Results) -> list[Message]:
         if form > _MOSTLY * chance:
             value = results.parameters[name]
             parts.append(f"{form / value:.1%} of {words} (by chance: {chance / value:.1%})")
-    if not parts:
-        return []
-    text = (
-        f"What form G may have, where noise or film hide it, makes {' and '.join(parts)}: lines "
-        "regularisation and window of the budget. It is of a prior in which no sensor is exactly a "
-        "Gaussian. Halves of a scan, and scans like it, share it: they agree better than that."
-    )
-    return [Message("form_of_g", text)]
+    if parts:
+        yield Message(
+            "form_of_g",
+            f"What form G may have, where noise or film hide it, makes {' and '.join(parts)}: "
+            "lines regularisation and window of the budget. It is of a prior in which no sensor is "
+            "exactly a Gaussian. Halves of a scan, and scans like it, share it: they agree better "
+            "than that.",
+        )
 
 
-def _law(solution: Solution, results: Results) -> list[Message]:
-    """Return which law the reference has, and what is not known of it."""
+def _law(solution: Solution, results: Results) -> Iterator[Message]:
+    """Say which law the reference has, and what is not known of it."""
     if not solution.on_films:
-        return []
+        return
     film = solution.scan.set_up.film
     law = film.law
     changes = results.changes
@@ -187,7 +189,8 @@ def _law(solution: Solution, results: Results) -> list[Message]:
     rows = [parameters.names.index(name) for name in MOVED[:2]]
     if law == LINEAR:
         text = "The film is taken as linear elastic, as stated; no other law is counted."
-        return [Message("film_law", text)]
+        yield Message("film_law", text)
+        return
 
     def changed(by: str) -> str:
         if by not in changes:
@@ -221,7 +224,7 @@ def _law(solution: Solution, results: Results) -> list[Message]:
             text += "one that slides by the opposite: that is counted (rod_friction)."
         else:
             text += f"it is taken to stick, and sliding {changed('rod_friction')}."
-    return [Message("film_law", text)]
+    yield Message("film_law", text)
 
 
 def _unstated(solution: Solution) -> list[Message]:
@@ -236,18 +239,17 @@ def _unstated(solution: Solution) -> list[Message]:
     return quality.uncertainty_unstated_messages(uncertainties)
 
 
-def _assumed(assumptions: Sequence[Assumption], counted: Container[str]) -> list[Message]:
-    """Return what is taken for granted, and the size of each that moves A by one u."""
+def _assumed(assumptions: Sequence[Assumption], counted: Container[str]) -> Iterator[Message]:
+    """Say what is taken for granted, and the size of each that moves A by one u."""
     listed = []
     for assumption in assumptions:
         if assumption.state == ASSUMED and _LINES.get(assumption.name) not in counted:
             reached = assumption.size_text("conversion_constant")
             listed.append(f"{assumption.words} ({assumption.measure}: {reached})")
-    if not listed:
-        return []
-    text = (
-        "Taken for granted, and in no uncertainty; in brackets the size that moves A by one "
-        f"standard uncertainty: {'; '.join(listed)}. State the uncertainty of one to have it "
-        "counted."
-    )
-    return [Message("assumptions", text)]
+    if listed:
+        yield Message(
+            "assumptions",
+            "Taken for granted, and in no uncertainty; in brackets the size that moves A by one "
+            f"standard uncertainty: {'; '.join(listed)}. State the uncertainty of one to have it "
+            "counted.",
+        )

@@ -1,6 +1,7 @@
 """Estimate of a radial profile from the points of scans: centre, baseline, noise and outliers."""
 
 import math
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import cached_property
 
@@ -402,10 +403,9 @@ def gaussian_log_marginal(estimate: ProfileEstimate, fit: GaussianFit) -> float:
     weights = estimate.weights
     if not fit.has_width(weights, estimate.noise_scale):
         return -math.inf
-    points = fit.points
     # The prior of a curvature is a further reading.
     _, prior = fit.prior
-    left = np.append(points.standardised(points.u - fit.predicted, weights), prior)
+    left = np.append(fit.points.standardised(fit.points.u - fit.predicted, weights), prior)
     freedom = float(estimate.outlier_weight.sum()) + prior.size - fit.jacobian.shape[1]
     variance = max(float(left @ left) / freedom, _least_noise(fit) ** 2)
     loss = freedom * math.log(variance) + left @ left / variance
@@ -519,9 +519,8 @@ def _why_undetermined(estimate: ProfileEstimate, *, shown: bool) -> str:
 def _share(estimate: ProfileEstimate, block: IndexArray) -> float:
     """Share of the variance of A that would go if the parameters of a block were known."""
     covariance = estimate.weighed.covariance
-    integrals = estimate.basis.integrals
     deviation = np.sqrt(np.maximum(np.diag(covariance)[block], TINY))
-    with_a = (integrals @ covariance)[block] / deviation
+    with_a = (estimate.basis.integrals @ covariance)[block] / deviation
     correlation = covariance[np.ix_(block, block)] / np.outer(deviation, deviation)
     return float(with_a @ np.linalg.pinv(correlation, hermitian=True) @ with_a)
 
@@ -562,10 +561,11 @@ def _least_distance(matrix: FloatArray, bound: FloatArray) -> FloatArray:
     dual, _ = nnls(both, target, maxiter=50 * bound.size)
     residual = both @ dual - target
     if not residual[-1] < -1e-12:
-        problem = "No apparatus function that meets the constraint comes near the scan."
-        why = "It would have to be negative, or to rise, somewhere."
-        cure = "Leave out the constraint: nonnegative=false, monotone=false."
-        raise FitError(problem, why=why, cure=cure)
+        raise FitError(
+            "No apparatus function that meets the constraint comes near the scan.",
+            why="It would have to be negative, or to rise, somewhere.",
+            cure="Leave out the constraint: nonnegative=false, monotone=false.",
+        )
     return np.asarray(-residual[:-1] / residual[-1])
 
 
@@ -573,24 +573,25 @@ def _least_distance(matrix: FloatArray, bound: FloatArray) -> FloatArray:
 _MOST_LISTED = 10
 
 
-def point_messages(estimate: ProfileEstimate) -> list[Message]:
-    """Return what was left out of a scan, and which points are outliers, the farthest first."""
+def point_messages(estimate: ProfileEstimate) -> Iterator[Message]:
+    """Say what was left out of a scan, and which points are outliers, the farthest first."""
     points = estimate.points
-    messages = []
     if points.missing:
         text = f"{points.missing} points of the scan are missing and were left out."
         if points.missing == 1:
             text = "A point of the scan is missing and was left out."
-        messages.append(Message("missing_points", text))
+        yield Message("missing_points", text)
     if estimate.basis.angular and points.u.size > MOST_READINGS:
-        text = (
+        yield Message(
+            "plane",
             f"Shapes of G that are free in the plane were left out: the raster has "
-            f"{points.u.size:,} readings, and they are weighed for at most {MOST_READINGS:,}."
+            f"{points.u.size:,} readings, and they are weighed for at most {MOST_READINGS:,}.",
         )
-        messages.append(Message("plane", text))
     elif estimate.free:
-        text = "G is free in the plane: the scan shows that it has no shape about one centre."
-        messages.append(Message("plane", text))
+        yield Message(
+            "plane",
+            "G is free in the plane: the scan shows that it has no shape about one centre.",
+        )
     weight = estimate.outlier_weight
     outliers = np.argsort(weight, kind="stable")[: (weight < OUTLIER_WEIGHT).sum()]
     for i in outliers[:_MOST_LISTED]:
@@ -601,10 +602,10 @@ def point_messages(estimate: ProfileEstimate) -> list[Message]:
             place += f" of repeat {points.repeat[i] + 1}"
         seen = points.reading.text(points.u[i], ".4g")
         voltages = f"{seen} instead of {points.reading.text(estimate.predicted[i], '.4g')}"
-        text = f"Outlier at {place}: {voltages}; its weight is {weight[i]:.2g}."
-        messages.append(Message("outlier", text))
+        yield Message("outlier", f"Outlier at {place}: {voltages}; its weight is {weight[i]:.2g}.")
     more = outliers.size - _MOST_LISTED
     if more > 0:
-        text = f"More outliers, which depart by less and have reduced weights, too: {more}."
-        messages.append(Message("outlier", text))
-    return messages
+        yield Message(
+            "outlier",
+            f"More outliers, which depart by less and have reduced weights, too: {more}.",
+        )
