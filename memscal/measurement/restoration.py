@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from scipy.special import chdtrc
 
 from memscal.apparatus import ApparatusFunction
-from memscal.axisymmetry.hankel import RadialSpectrum, hankel_transform
+from memscal.axisymmetry.hankel import hankel_transform
 from memscal.errors import InputError
 from memscal.estimation.points import ScanPoints
 from memscal.formats.reference import read_reference
@@ -282,9 +282,7 @@ class Restoration(Result, Checked):
     def _at_zero(self) -> FloatArray:
         """Row that reads a transform at k = 0: by a parabola in k^2, as :class:`RadialSpectrum`."""
         wavenumbers = self.posterior.wavenumbers
-        row = np.zeros(wavenumbers.k.size)
-        row[:3] = [RadialSpectrum(wavenumbers, unit).integral for unit in np.eye(3, row.size)]
-        return row
+        return wavenumbers.integrals(np.eye(wavenumbers.k.size))
 
     def _along_free(self, values: FloatArray) -> FloatArray:
         centre = np.zeros(2)
