@@ -76,13 +76,12 @@ def _clipped(scan: Scan) -> str:
     if scan.at_ceiling:
         text = at_ceiling_text(round(scan.at_ceiling))
         return f"{text} The others may not tell A: measure with a lower gain or load."
-    reading = scan.reading
     top = clipped_looks(scan.u_zz[np.isfinite(scan.u_zz)])
     if top.size:
         lowest = top[-1] - np.ptp(top) - _BELOW * abs(top[-1])
-        ceiling = reading.text(float(lowest), ".6g")
+        ceiling = scan.reading.text(float(lowest), ".6g")
         return (
-            f"{top.size} readings look clipped: they agree at {reading.text(top[0], '.4g')}. "
+            f"{top.size} readings look clipped: they agree at {scan.reading.text(top[0], '.4g')}. "
             "If amplifier or converter was at its end there, leave them out (memscal import "
             f"--ceiling VALUE, {ceiling}), or measure with a lower gain or load."
         )
@@ -109,8 +108,10 @@ def diagnosed(
         return _hidden(outcome, search)
     if isinstance(outcome, FitError):
         return outcome
-    cure = "Look at the scan; check the values and units of positions, film and rod."
-    return FitError("No apparatus function of any width fits the scan.", cure=cure)
+    return FitError(
+        "No apparatus function of any width fits the scan.",
+        cure="Look at the scan; check the values and units of positions, film and rod.",
+    )
 
 
 def _hidden(estimate: ProfileEstimate, search: _Search) -> FitError:

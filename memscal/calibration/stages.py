@@ -195,10 +195,11 @@ def prepare_fields(
     if smoothed is not None and (data.as_raster or (data.planar and not divided)):
         return RasterFields.place(estimate, smoothed, choice, divided)
     if divided and not (estimate.model.sums_waves or data.as_raster):
-        problem = "The reference is a field that is not round, which a line does not show."
-        why = "A division needs the voltage over the plane, as one raster has it."
-        cure = 'Use method="bayesian" (--method bayesian), or scan one raster.'
-        raise InputError(problem, why=why, cure=cure)
+        raise InputError(
+            "The reference is a field that is not round, which a line does not show.",
+            why="A division needs the voltage over the plane, as one raster has it.",
+            cure='Use method="bayesian" (--method bayesian), or scan one raster.',
+        )
     return LineFields.lift(estimate, (smoothed or estimate).spectrum, choice)
 
 
@@ -245,8 +246,7 @@ class Solution:
     @property
     def comparable(self) -> bool:
         """Whether the fields can be divided, so that both routes are open."""
-        estimate = self.estimate
-        round_fields = estimate.model.sums_waves or estimate.points.as_raster
+        round_fields = self.estimate.model.sums_waves or self.estimate.points.as_raster
         return self.smoothed is not None and self.fields.even and round_fields
 
     @cached_property

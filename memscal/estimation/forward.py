@@ -398,9 +398,15 @@ def forward_model(points: ScanPoints, references: Sequence[RadialSpectrum]) -> F
     nodes = references[0].wavenumbers.k.size
     size = points.u.size
     if nodes > _MOST_WAVES and size > DENSE and not points.planar:
-        why = f"A source with an edge takes {nodes:,} wavenumbers, where a film takes some hundred."
-        cure = "Average neighbouring readings, or give a source without an edge (gaussian:S)."
-        raise too_large("The scan", size, DENSE, "points for such a reference", cure=cure, why=why)
+        raise too_large(
+            "The scan",
+            size,
+            DENSE,
+            "points for such a reference",
+            cure="Average neighbouring readings, or give a source without an edge (gaussian:S).",
+            why=f"A source with an edge takes {nodes:,} wavenumbers, where a film takes some "
+            "hundred.",
+        )
     models = [reference.model for reference in references if reference.model]
     model: ForwardModel = [*models, ForwardModel][0](points, tuple(references))
     return model

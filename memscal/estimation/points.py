@@ -65,10 +65,11 @@ def channel_signal(scan: Scan, channel: str) -> tuple[FloatArray, FloatArray | N
             "channel zz.",
         )
     if scan.planar:
-        problem = f"Channel {channel} cannot be calibrated with a raster."
-        why = "A raster is used as a field, and the shear's has a line of zeros through it."
-        cure = f"Calibrate with lines along {along} through the sensor; cut one from the raster."
-        raise InputError(problem, why=why, cure=cure)
+        raise InputError(
+            f"Channel {channel} cannot be calibrated with a raster.",
+            why="A raster is used as a field, and the shear's has a line of zeros through it.",
+            cure=f"Calibrate with lines along {along} through the sensor; cut one from the raster.",
+        )
     if scan.direction != along:
         raise InputError(
             f"The scan runs along {scan.direction}, and channel {channel} measures the shear "
@@ -302,14 +303,17 @@ def measured_points(scan: Scan, channel: str = "zz") -> ScanPoints:
     u, errors = channel_signal(scan, channel)
     keep = measured_mask(scan, channel)
     if not keep.any():
-        problem = f"Every point of u_{channel} is missing (NaN)."
-        why = "There is nothing to calibrate with."
-        raise InputError(problem, why=why, cure="Check the voltage column and its import.")
+        raise InputError(
+            f"Every point of u_{channel} is missing (NaN).",
+            why="There is nothing to calibrate with.",
+            cure="Check the voltage column and its import.",
+        )
     if errors is not None and np.any(errors[keep] <= 0):
-        problem = f"u_{channel}_errors holds a standard uncertainty of zero."
-        why = "A point without noise would outweigh every other point."
-        cure = "Give the electronic noise, or leave it out to have it estimated."
-        raise InputError(problem, why=why, cure=cure)
+        raise InputError(
+            f"u_{channel}_errors holds a standard uncertainty of zero.",
+            why="A point without noise would outweigh every other point.",
+            cure="Give the electronic noise, or leave it out to have it estimated.",
+        )
     x, y = scan.positions
     load = scan.stated_load if scan.normal_load is None else scan.normal_load
     x_errors = 0.0 if scan.x_errors is None else scan.x_errors
@@ -350,8 +354,7 @@ def calibration_points(scan: Scan, channel: str = "zz") -> ScanPoints:
     relative = scan.baseline_curvature_uncertainty
     # The median of three points does not follow a single outlier.
     rise = np.sort(np.abs(rise_of(points.x, points.y, points.u)))
-    largest = float(np.median(rise[-3:]))
-    deviation = largest * (CURVATURE if relative is None else relative)
+    deviation = float(np.median(rise[-3:])) * (CURVATURE if relative is None else relative)
     return replace(points, curvature=np.array([deviation]))
 
 
@@ -377,10 +380,11 @@ def scans_of_repeats(scans: Sequence[Scan], channel: str) -> tuple[list[Scan], t
             )
         between = scan.u_zz_correlation if scan.kind == "points" else None
         if between is not None and across(between, passes):
-            problem = "u_zz_correlation correlates the noise of one repeat with that of another."
-            why = "Repeats with centres of their own are fitted as separate measurements."
-            cure = 'Take one centre for all (centre="common", --centre common).'
-            raise InputError(problem, why=why, cure=cure)
+            raise InputError(
+                "u_zz_correlation correlates the noise of one repeat with that of another.",
+                why="Repeats with centres of their own are fitted as separate measurements.",
+                cure='Take one centre for all (centre="common", --centre common).',
+            )
         separate += [scan.only_passes(number) for number in measured]
         owners += [i] * measured.size
     if len(separate) <= len(scans):
@@ -412,13 +416,17 @@ def scans_by_load(scans: Sequence[Scan]) -> tuple[list[Scan], tuple[int, ...]]:
                 group = left[means[left] <= (1 + _SAME_LOAD) * means[left[0]]]
                 left = left[group.size :]
                 load = float(means[group].mean())
-                u = scan.load_uncertainty and scan.load_uncertainty * load / scan.stated_load
-                part = scan.only_passes(np.sort(numbers[group]))
-                parts.append(replace(part, load=load, load_uncertainty=u))
+                parts.append(passes_at_load(scan, numbers[group], load))
         parts = parts or [scan]
         split += parts
         owners += [i] * len(parts)
     return split, tuple(owners)
+
+
+def passes_at_load(scan: Scan, numbers: IndexArray, load: float) -> Scan:
+    """Return passes as a scan of one load (N), of the relative uncertainty of the whole scan's."""
+    u = scan.load_uncertainty and scan.load_uncertainty * load / scan.stated_load
+    return replace(scan.only_passes(np.sort(numbers)), load=load, load_uncertainty=u)
 
 
 def loads_differ(loads: ArrayLike) -> bool:
@@ -444,9 +452,11 @@ def joined_points(scans: Sequence[ScanPoints], owners: Sequence[int] | None = No
         return scans[0]
     stated = [points.u_errors for points in scans if points.u_errors is not None]
     if len(stated) not in (0, len(scans)):
-        problem = "Some of the scans state their noise (u_zz_errors) and others do not."
-        cure = "State it in every scan, or leave it out of every one."
-        raise InputError(problem, why="It determines their relative weights.", cure=cure)
+        raise InputError(
+            "Some of the scans state their noise (u_zz_errors) and others do not.",
+            why="It determines their relative weights.",
+            cure="State it in every scan, or leave it out of every one.",
+        )
     number = np.repeat(np.arange(len(scans)), [points.u.size for points in scans])
     before = np.cumsum([0, *(int(points.repeat.max()) + 1 for points in scans)])
     names = ("x", "y", "u", "load", "x_errors", "branch", "anew", "free", "curvature", "repeat")
@@ -545,13 +555,17 @@ def _require_usable(points: ScanPoints) -> None:
     positions = points.places[0].count
     needed = MINIMUM_POSITIONS + 2 * points.planar
     if positions < needed:
-        problem = f"The scan has {positions} measured positions; at least {needed} are needed."
-        why = "Conversion constant, width, centre, baseline and noise are estimated from them."
-        raise FitError(problem, why=why, cure="Scan more positions.")
+        raise FitError(
+            f"The scan has {positions} measured positions; at least {needed} are needed.",
+            why="Conversion constant, width, centre, baseline and noise are estimated from them.",
+            cure="Scan more positions.",
+        )
     if np.ptp(points.u) == 0:
-        problem = f"Every voltage of the scan is {points.u[0]:g} {points.reading.si}."
-        why = "A calibration needs a voltage that follows the indenter."
-        raise InputError(problem, why=why, cure="Check the channel.")
+        raise InputError(
+            f"Every voltage of the scan is {points.u[0]:g} {points.reading.si}.",
+            why="A calibration needs a voltage that follows the indenter.",
+            cure="Check the channel.",
+        )
     # The parity of a shear is tested later, by estimation.gaussian.
     if points.order:
         return
@@ -578,9 +592,14 @@ def require_size(scans: Sequence[Scan]) -> None:
     if size > most:
         named = ", ".join(scan.source.file_name for scan in scans if scan.source) or "The scan"
         of = f"points {'in a plane' if raster else 'on lines'}"
-        why = "Time and memory grow with their number."
-        cure = "Average neighbouring readings, thin the raster, or leave out repeats."
-        raise too_large(named, size, most, of, why=why, cure=cure)
+        raise too_large(
+            named,
+            size,
+            most,
+            of,
+            why="Time and memory grow with their number.",
+            cure="Average neighbouring readings, thin the raster, or leave out repeats.",
+        )
 
 
 def across(correlation: FloatArray, group: IndexArray) -> bool:

@@ -87,9 +87,11 @@ def _spectrum(stress: BaseStress, wavenumbers: Wavenumbers, points: ScanPoints) 
     values = stress.form.transform(wavenumbers.k) / stress.load
     if stress.ideal is not None and stress.ideal.shape == "slit":
         if points.planar:
-            why = "It is scanned across, along a line, and shows nothing of any other direction."
-            cure = "Give a line scan."
-            raise InputError("A slit is the reference of a raster.", why=why, cure=cure)
+            raise InputError(
+                "A slit is the reference of a raster.",
+                why="It is scanned across, along a line, and shows nothing of any other direction.",
+                cure="Give a line scan.",
+            )
         return RadialSpectrum(wavenumbers, values, ACROSS, source=True)
     # What a scan samples of a field is looked at.
     seen = np.linspace(0.0, min(np.pi / points.step, wavenumbers.k[-1]), _SEEN)[1:]
@@ -149,10 +151,11 @@ def _table_spectrum(reference: StressProfile, k: FloatArray, span: float, order:
             cure="Extend the reference to where it has decayed, or leave it out to compute it.",
         )
     if reference.r[0] > 0.1 * needed:
-        why = "The stress on the axis, its largest, is missing."
-        cure = "Give the reference from r = 0 outward."
-        problem = f"The reference begins at r = {reference.r[0] * 1e3:.4g} mm."
-        raise InputError(problem, why=why, cure=cure)
+        raise InputError(
+            f"The reference begins at r = {reference.r[0] * 1e3:.4g} mm.",
+            why="The stress on the axis, its largest, is missing.",
+            cure="Give the reference from r = 0 outward.",
+        )
     values = hankel_transform(reference.r, stress, k, order=order) / reference.load
     # Most of a shear, whatever the film, holds the film back.
     if order and values[np.argmax(np.abs(values))] > 0:
@@ -163,9 +166,11 @@ def _table_spectrum(reference: StressProfile, k: FloatArray, span: float, order:
             cure="Change the sign of sigma_rz in the reference (memscal import --shear-sign -1).",
         )
     if not order and values[0] <= 0:
-        problem = "The stress of the reference adds up to a pull, not a push."
-        why = "Normal stress is positive in compression."
-        raise InputError(problem, why=why, cure="Change the sign of sigma_zz in the reference.")
+        raise InputError(
+            "The stress of the reference adds up to a pull, not a push.",
+            why="Normal stress is positive in compression.",
+            cure="Change the sign of sigma_zz in the reference.",
+        )
     return values
 
 
@@ -256,9 +261,8 @@ def law_sensitivities(set_up: SetUp, reference: RadialSpectrum) -> dict[str, Flo
     # (``model_form``), and as half that of sticking and sliding where the friction of a rod on a
     # film at finite strain is not (``rod_friction``), for the reference is midway.
     film = set_up.film
-    rod = set_up.indenter
     changes: dict[str, FloatArray] = {}
-    if film.law == LINEAR or not isinstance(rod, Rod):
+    if film.law == LINEAR or not isinstance(set_up.indenter, Rod):
         return changes
     if not film.law:
         own = press_rod(*set_up)
@@ -268,7 +272,7 @@ def law_sensitivities(set_up: SetUp, reference: RadialSpectrum) -> dict[str, Flo
         changes["model_form"] = RECTANGLE * spectrum_difference(reference, linear, own)
     if set_up.rod_friction is None:
         with suppress(*UNSOLVED):
-            ends = stick_and_slide(film, rod, set_up.load)
+            ends = stick_and_slide(film, set_up.indenter, set_up.load)
             # Per newton the difference of rods that are solved at less load grows with the load.
             half = RECTANGLE * set_up.load / ends[0].load / 2
             changes["rod_friction"] = half * spectrum_difference(reference, *ends)
@@ -288,8 +292,7 @@ def difference(set_up: SetUp, reference: RadialSpectrum, more: SetUp, less: SetU
     rods = (more, less, set_up)
     upper, lower, own = (rod_spectrum(r, reference, law) * set_up.load / r.load for r in rods)
     # Zero where the scan's own ends.
-    share = np.divide(upper - lower, own, out=np.zeros_like(own), where=own != 0)
-    return reference.values * share
+    return reference.values * np.divide(upper - lower, own, out=np.zeros_like(own), where=own != 0)
 
 
 def law_at_once(set_up: SetUp) -> str:

@@ -1,7 +1,7 @@
 """Set-up of a calibration: the reference of each scan, and whether both are of one film and rod."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -87,9 +87,11 @@ def require_one_sensor(scans: Sequence[Scan]) -> tuple[Scan, ...]:
     sensors = {(s.sensor.name or "unnamed", s.sensor.channel, s.unit): None for s in scans}
     if len(sensors) > 1:
         named = ", ".join(f"{name} ({channel}, in {unit})" for name, channel, unit in sensors)
-        why = "Scans that are fitted together share one apparatus function."
-        cure = "Calibrate each sensor by itself; check /entry/instrument/stress_sensor."
-        raise InputError(f"The scans are of {len(sensors)} sensors: {named}.", why=why, cure=cure)
+        raise InputError(
+            f"The scans are of {len(sensors)} sensors: {named}.",
+            why="Scans that are fitted together share one apparatus function.",
+            cure="Calibrate each sensor by itself; check /entry/instrument/stress_sensor.",
+        )
     films: dict[str, ElasticFilm] = {}
     for film in (scan.film for scan in scans if scan.film is not None):
         first = films.setdefault(film.name, film)
@@ -129,7 +131,7 @@ def require_same_set_up(
     """Refuse a reference of another film, rod or load than its scan; or return the differences."""
     # :func:`stated_differences` has the rule; ``None`` stands for the reference in the scan, and an
     # alternative may have another law and friction, which it is given for.
-    differences = []
+    differences: list[Difference] = []
     for scan, reference in zip(scans, references, strict=True):
         stress = reference or scan.reference
         if stress is not None and stress.form is None:
@@ -152,8 +154,8 @@ def require_same_set_up(
     )
 
 
-def _other_set_up(scan: Scan, stress: BaseStress, kind: str) -> list[Difference]:
-    """Return what of film, rod and load a stress was not calculated for."""
+def _other_set_up(scan: Scan, stress: BaseStress, kind: str) -> Iterator[Difference]:
+    """Yield what of film, rod and load a stress was not calculated for."""
     source = None if isinstance(stress, Contact) else stress.source
     places = (file_in_words(scan.source, "scan"), file_in_words(source, kind))
     film = film_of(stress)
@@ -167,19 +169,19 @@ def _other_set_up(scan: Scan, stress: BaseStress, kind: str) -> list[Difference]
     if kind == "reference":
         names += ["law", "mooney_rivlin_ratio"]
     # What one side does not state does not differ.
-    differences = stated_differences(FILM, names, (scan.film, film), places, "film")
+    yield from stated_differences(FILM, names, (scan.film, film), places, "film")
     pair = scan.indenter, stress.indenter
-    differences += stated_differences(INDENTER, ("shape", "radius"), pair, places, "rod")
+    yield from stated_differences(INDENTER, ("shape", "radius"), pair, places, "rod")
     if kind == "reference" and finite:
         friction = stress.friction if isinstance(stress, Contact) else stress.friction_coefficient
         rods = scan, SimpleNamespace(rod_friction=friction)
-        differences += stated_differences(LOAD, ("rod_friction",), rods, places)
+        yield from stated_differences(LOAD, ("rod_friction",), rods, places)
     if law == LINEAR or (scan.load is None and scan.normal_load is None):
-        return differences
+        return
     loads = (_farthest(scan, stress), stress)
     # Under another law the stress is not proportional to the load.
     there = f"{places[1]} (film: {law or 'law not stated'})"
-    return differences + stated_differences(LOAD, ("load",), loads, (places[0], there))
+    yield from stated_differences(LOAD, ("load",), loads, (places[0], there))
 
 
 def _farthest(scan: Scan, stress: BaseStress) -> SimpleNamespace:
@@ -199,19 +201,17 @@ def file_in_words(source: SourceFile | None, kind: str) -> str:
 
 def stated_differences(
     record: Record, names: Sequence[str], stated: Sequence[Any], places: Sequence[str], of: str = ""
-) -> list[Difference]:
-    """Return which quantities two sides both state, and with values that do not agree."""
+) -> Iterator[Difference]:
+    """Yield which quantities two sides both state, and with values that do not agree."""
     # Numbers agree within twice the standard uncertainty of their difference, or within 1e-6 of
     # them where no uncertainty is stated; texts if they are equal.
-    differences = []
     for quantity in (q for q in record.quantities if q.name in names):
         values: list[Any] = [getattr(side, quantity.name, None) for side in stated]
         spreads = [getattr(side, f"{quantity.name}_uncertainty", None) for side in stated]
         if None in values or "" in values or values[0] == values[1]:
             continue
         allowed = COVERAGE * math.hypot(*(u or 0.0 for u in spreads))
-        is_text = isinstance(values[0], str)
-        if not is_text and math.isclose(*values, rel_tol=_SAME, abs_tol=allowed):
+        if not isinstance(values[0], str) and math.isclose(*values, rel_tol=_SAME, abs_tol=allowed):
             continue
         words = quantity.words if " of the " in quantity.words else f"{of} {quantity.words}"
         sides = []
@@ -222,8 +222,7 @@ def stated_differences(
                 unit = quantity.unit and f" {quantity.unit}"
                 shown = f"{value / quantity.scale:.7g}{unit} (u {u})"
             sides.append(shown)
-        differences.append((*places, words.strip(), *sides))
-    return differences
+        yield (*places, words.strip(), *sides)
 
 
 def accepted_differences(differences: Sequence[Difference], **words: Any) -> list[str]:

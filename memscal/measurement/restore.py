@@ -12,7 +12,7 @@ from memscal.apparatus import ApparatusFunction, opened_apparatus
 from memscal.axisymmetry.hankel import RadialSpectrum, Wavenumbers
 from memscal.errors import FitError, InputError
 from memscal.estimation.model_tests import axisymmetry_test, symmetry_test
-from memscal.estimation.points import ScanPoints, measured_points
+from memscal.estimation.points import ScanPoints, measured_points, passes_at_load
 from memscal.estimation.profile import (
     CentreError,
     ProfileEstimate,
@@ -77,8 +77,7 @@ def single_loads(scan: Scan) -> tuple[Scan, ...]:
     singles = []
     for group in np.split(order, starts):
         load = float(np.nanmedian(scan.normal_load[np.isin(passes, group)]))
-        u = scan.load_uncertainty and scan.load_uncertainty * load / scan.stated_load
-        singles.append(replace(scan.only_passes(np.sort(group)), load=load, load_uncertainty=u))
+        singles.append(passes_at_load(scan, group, load))
     return tuple(singles)
 
 
@@ -208,8 +207,10 @@ def accept_other_sensor(
         )
     sensors = (scan.sensor, apparatus.sensor)
     films = (scan.film, apparatus.film)
-    differences = stated_differences(SENSOR, names, sensors, places)
-    differences += stated_differences(FILM, _FILM, films, places, "film")
+    differences = [
+        *stated_differences(SENSOR, names, sensors, places),
+        *stated_differences(FILM, _FILM, films, places, "film"),
+    ]
     return accepted_differences(
         differences,
         override=override,
@@ -272,8 +273,7 @@ def force_less_load(
     """Return standard uncertainties, in N, of a total force less its load, by source."""
     # A load that is larger than stated, if the rod's was on the same load cell, makes A smaller and
     # the force larger: both rise together.
-    of_load = force_budget.get("load", 0.0) - (load_uncertainty or 0.0)
-    return {**force_budget, "load": of_load}
+    return {**force_budget, "load": force_budget.get("load", 0.0) - (load_uncertainty or 0.0)}
 
 
 def _noise(restored: Restoration) -> Iterator[QualityCheck]:
@@ -315,12 +315,11 @@ def _symmetry(restored: Restoration) -> QualityCheck:
 
 def _messages(restored: Restoration, checks: Sequence[QualityCheck]) -> Iterator[Message]:
     """Yield the messages that accompany a result, warnings first."""
-    points = restored.points
     yield from failed_check_messages(checks)
     yield from failed_calibration_messages(restored.apparatus)
     yield from point_messages(restored.posterior.estimate)
-    if points.u_errors is None:
-        yield noise_unstated_message(points.reading.text(restored.noise.min()))
+    if restored.points.u_errors is None:
+        yield noise_unstated_message(restored.points.reading.text(restored.noise.min()))
     if not restored.apparatus.radial_profile.g_errors.any():
         yield Message(
             "uncertainty_unstated",
@@ -335,10 +334,11 @@ def _messages(restored: Restoration, checks: Sequence[QualityCheck]) -> Iterator
     yield from uncertainty_unstated_messages(unstated)
 
 
-def failed_calibration_messages(apparatus: ApparatusFunction) -> list[Message]:
-    """Return one message if a check of the calibration had failed, else none."""
-    text = f"Quality checks of the calibration itself {state_of_checks(apparatus.checks)}."
-    return [] if apparatus.passed else [Message(FAILED_CALIBRATION, text)]
+def failed_calibration_messages(apparatus: ApparatusFunction) -> Iterator[Message]:
+    """Say that a check of the calibration had failed, if one had."""
+    if not apparatus.passed:
+        text = f"Quality checks of the calibration itself {state_of_checks(apparatus.checks)}."
+        yield Message(FAILED_CALIBRATION, text)
 
 
 def noise_unstated_message(noise: str) -> Message:
@@ -412,8 +412,7 @@ def restore(
     overridden = accepted_alterations(*sources)
     overridden += accept_mismatches(measured, sensor, override=override)
     restored = restore_known(measured, sensor, expected)
-    messages = override_messages(overridden)
-    return replace(restored, messages=(*messages, *restored.messages))
+    return replace(restored, messages=(*override_messages(overridden), *restored.messages))
 
 
 def restore_known(
