@@ -131,8 +131,7 @@ class RadialSpectrum:
     def plane(self, ky: FloatArray, kx: FloatArray) -> FloatArray:
         """Transform over the plane, (ky, kx); zero beyond the last node."""
         nodes = self.wavenumbers.k
-        k = np.hypot.outer(ky, kx)
-        return up_to(nodes[-1], radial_spline(nodes, self.values), k)
+        return up_to(nodes[-1], radial_spline(nodes, self.values), np.hypot.outer(ky, kx))
 
 
 def radial_spline(r: FloatArray, f: FloatArray, *, order: int = 0) -> ArrayFunction:

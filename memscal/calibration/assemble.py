@@ -150,13 +150,12 @@ def _plane(solution: Solution, results: Results) -> ApparatusField:
 
 def _radial(solution: Solution, deconvolution: Deconvolution, results: Results) -> ApparatusRadial:
     g = deconvolution.g
-    covariance = results.radial_covariance
     gaussian = unit_gaussian(g.r, solution.estimate.gaussian.sigma)
-    errors = np.sqrt(np.diag(covariance))
+    errors = np.sqrt(np.diag(results.radial_covariance))
     with_a = results.cross_covariance[:, results.parameters.names.index("conversion_constant")]
     scale = errors * results.parameters.uncertainty("conversion_constant")
     correlation = np.divide(with_a, scale, out=np.zeros_like(with_a), where=scale > 0)
-    return ApparatusRadial(g.r, g.radial, errors, gaussian, covariance, correlation)
+    return ApparatusRadial(g.r, g.radial, errors, gaussian, results.radial_covariance, correlation)
 
 
 def _reconvolution(solution: Solution) -> Reconvolution:

@@ -151,11 +151,10 @@ def _sizes(effect: Influence, results: Results) -> dict[str, float]:
 def _correlations(solution: Solution, results: Results) -> dict[str, float]:
     """Correlations of neighbours that add a squared uncertainty to the variance by noise."""
     # Of noise whose correlation falls off exponentially along each pass.
-    estimate = solution.estimate
-    points = estimate.points
+    points = solution.estimate.points
     order = np.lexsort((points.x, points.y, points.repeat))
     passes = points.repeat[order]
-    by_noise = results.by_voltage.dense() * estimate.noise
+    by_noise = results.by_voltage.dense() * solution.estimate.noise
     sizes = {}
     for parameter in MOVED:
         row = by_noise[results.parameters.names.index(parameter), order]

@@ -145,9 +145,8 @@ def _reconvolutions(solution: Solution) -> _Checks:
 
 def _constraint(solution: Solution) -> _Checks:
     """Compare a G that was kept from falling below zero, or from rising, with the free one."""
-    method = solution.method
     estimate = solution.estimate
-    if not (isinstance(method, Bayesian) and method.constrained):
+    if not (isinstance(solution.method, Bayesian) and solution.method.constrained):
         return
     points = estimate.points
     weights = estimate.weights / estimate.noise_scale**2
@@ -257,9 +256,8 @@ def _field_shape(solution: Solution, results: Results) -> _Checks:
             "uncertainties, over the largest G. A failure means that G has ripples that its "
             "uncertainty does not count: look at the field of G, and take method bayesian.",
         )
-    weight = estimate.outlier_weight
-    left = weight * (estimate.points.u - estimate.predicted)
-    noise = solution.band.excess * weight**0.5 * estimate.noise
+    left = estimate.outlier_weight * (estimate.points.u - estimate.predicted)
+    noise = solution.band.excess * estimate.outlier_weight**0.5 * estimate.noise
     degrees = estimate.raster_noise.degrees if estimate.raster_noise else _WELL_KNOWN
     yield _tested(
         "field_residuals",
@@ -307,10 +305,9 @@ def _set_up(solution: Solution) -> _Checks:
     )
     yield from _baseline(estimate)
     if not source:
-        force = carried_force(solution.stress, estimate.model.reference)
         yield check(
             "reference_force",
-            abs(force - 1.0),
+            abs(carried_force(solution.stress, estimate.model.reference) - 1.0),
             0.01,
             "Relative difference of the reference's total force from the load. A failure means "
             "that the reference was made for another load, or that its table ends too early; A is "
@@ -539,8 +536,7 @@ def _runs(estimate: ProfileEstimate) -> _Checks:
         return
     reading = estimate.points.reading
     largest = estimate.largest_signal
-    distance = runs.distance / reading.scale
-    apart = format_measured(distance, runs.error / reading.scale, reading.unit)
+    apart = format_measured(runs.distance / reading.scale, runs.error / reading.scale, reading.unit)
     yield check(
         "offset_agreement",
         abs(runs.distance) / largest,
@@ -605,13 +601,12 @@ def _held_out(estimate: ProfileEstimate) -> _Checks:
 
 
 def _saturation(estimate: ProfileEstimate) -> _Checks:
-    points = estimate.points
     if estimate.points.order:
         return
     clipped = np.flatnonzero(model_tests.clipped_points(estimate))
     where = ""
     if clipped.size:
-        axes = points.positions[points.free.any(axis=0)].T * 1e3
+        axes = estimate.points.positions[estimate.points.free.any(axis=0)].T * 1e3
         places = [", ".join(f"{p:.4g}" for p in place) for place in axes[clipped[:_MOST_NAMED]]]
         where = f", here at {'; '.join(places)} mm"
         if clipped.size > _MOST_NAMED:

@@ -193,22 +193,20 @@ def _statement(solution: Solution, name: str) -> tuple[float, float | None]:
 
 def _changed(solution: Solution, name: str, size: float, fit: GaussianFit) -> ForwardModel:
     """Model of scans where one thing is off by a size, without what that adds to the voltages."""
-    estimate = solution.estimate
-    model = estimate.model
+    model = solution.estimate.model
     points = model.points
     place = points.positions
     signal = fit.predicted - model.drift_columns @ fit.drift
     added: FloatArray | float = 0.0
     if name in OF_FILM:
         pairs = zip(solution.scans, model.references, strict=True)
-        references = tuple(_reference(*pair, name, size) for pair in pairs)
-        model = replace(model, references=references)
+        model = replace(model, references=tuple(_reference(*pair, name, size) for pair in pairs))
     elif name == "stage_scale":
         place = (1 + size) * place
     elif name == "line_offset":
         place = place + size * ~points.free[points.scan].T
     elif name == "baseline_curvature":
-        added = size * estimate.largest_signal * model.parabola
+        added = size * solution.estimate.largest_signal * model.parabola
     elif name == "gain_curvature":
         added = -size * signal * np.abs(signal) / np.abs(signal).max()
     else:

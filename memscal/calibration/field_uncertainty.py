@@ -172,8 +172,7 @@ class _Filter:
         every = 1
         for i, step in enumerate(fields.central.spacing):
             angle = 2 * np.pi * frequencies[i][band[i]]
-            offset = np.rint(axes[i] / step)
-            waves = np.exp(-1j * np.multiply.outer(angle, offset))
+            waves = np.exp(-1j * np.multiply.outer(angle, np.rint(axes[i] / step)))
             first = fields.index[i].min()
             nodes = np.arange(first, fields.index[i].max() + 1)
             at_nodes.append(waves)

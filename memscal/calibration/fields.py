@@ -218,19 +218,17 @@ class RasterFields:
         """What each reading (n,) adds to its node, over its voltage, in 1/N."""
         readings = np.zeros(self.voltage.values.shape)
         np.add.at(readings, self.index, 1.0)
-        estimate = smoothed.estimate
-        weight = estimate.outlier_weight / estimate.points.load
+        weight = smoothed.estimate.outlier_weight / smoothed.estimate.points.load
         return weight / readings[self.index]
 
     def gain(self, smoothed: SmoothedProfile) -> VoltageMap:
         """Derivative of the field's transform by the voltages, (k, n), its mean over directions."""
         # The transform is a sum over the lattice: of the points, and of the profile elsewhere.
-        estimate = smoothed.estimate
         share = self.share(smoothed)
         profiled = np.ones_like(self.voltage.values)
-        np.subtract.at(profiled, self.index, share * estimate.points.load)
+        np.subtract.at(profiled, self.index, share * smoothed.estimate.points.load)
         radius = self.grid.radius
-        table = wave_table(0, False, float(radius.max()), estimate.model.k.tobytes())
+        table = wave_table(0, False, float(radius.max()), smoothed.estimate.model.k.tobytes())
         everywhere = table.interpolation(radius.ravel())
         # J0(k r) J0(k' r) over what has something of the profile, by the table's splines.
         both = (everywhere.T @ everywhere.multiply(profiled.reshape(-1, 1))) @ table.spline.c

@@ -274,14 +274,10 @@ def free_thickness(solution: Solution) -> FreeThickness:
         varied = {}
         for film, thickness in zip(films, stated + z * u, strict=True):
             varied[film] = replace(film, thickness=float(thickness))
-        rods = []
-        for scan in scans:
-            set_up = scan.set_up
-            rods.append(press_rod(*set_up._replace(film=varied[set_up.film])))
+        rods = [press_rod(*s.set_up._replace(film=varied[s.set_up.film])) for s in scans]
         model = ForwardModel(estimate.points, reference_spectra(rods, points, nodes))
         varied_estimate = replace(estimate, model=model)
-        evidences = log_marginal_likelihood(varied_estimate, inputs, estimate.noise_scale)
-        return evidences - z @ z / 2
+        return log_marginal_likelihood(varied_estimate, inputs, estimate.noise_scale) - z @ z / 2
 
     # Sums over a grid, which are good to 1e-2 while its step is at most twice the width of a normal
     # density; where the posterior is narrower it is made finer.

@@ -401,11 +401,10 @@ def read_off(result: Deconvolution, radii: FloatArray) -> tuple[dict[str, float]
 def expected_values(solution: Solution) -> dict[str, float]:
     """Parameters that scans about the posterior mean give on average, to first order."""
     # A division follows the noise of its scan, of which scans drawn about the mean know nothing.
-    estimate = solution.estimate
     deconvolution = solution.deconvolution
     kernel, division = _kernel_derivatives(solution, deconvolution, np.zeros(0))
-    names, values, derivatives = _parameters(estimate, deconvolution, kernel, division)
-    noise = derivatives.by_voltage @ (estimate.points.u - drawn_about(solution))
+    names, values, derivatives = _parameters(solution.estimate, deconvolution, kernel, division)
+    noise = derivatives.by_voltage @ (solution.estimate.points.u - drawn_about(solution))
     return dict(zip(names, (values - noise).tolist(), strict=True))
 
 
@@ -453,8 +452,7 @@ def _parameters(
     shape = [1, *range(len(gain) - ellipse, len(gain))]
     nuisance = _fitted(kernel, estimate.weighed.gain[2 : 2 + count] * scale)
     nuisance.by_state[:, 2 : 2 + count] = np.diag(scale)
-    conversion = _fitted(kernel, gain[:1])
-    parts = [kernel[:1], _fitted(kernel, gain[shape]), widths, nuisance, conversion]
+    parts = [kernel[:1], _fitted(kernel, gain[shape]), widths, nuisance, _fitted(kernel, gain[:1])]
     values = [
         deconvolution.conversion_constant,
         fit.sigma,
@@ -522,10 +520,9 @@ def _kernel_derivatives(
 ) -> tuple[_Derivatives, DivisionMap | None]:
     """Derivatives of A, G at its radii and its transfer function by either route."""
     estimate = solution.estimate
-    smoothed = solution.smoothed
-    if not deconvolution.divided or smoothed is None:
+    if not deconvolution.divided or solution.smoothed is None:
         return _posterior_kernel(estimate, deconvolution, wavenumbers), None
-    division = _division_map(solution, smoothed, deconvolution, wavenumbers)
+    division = _division_map(solution, solution.smoothed, deconvolution, wavenumbers)
     # Centre, baseline and drift are parameters of the estimate.
     by_nuisance = -(division.direct @ division.nuisance)
     by_state = np.zeros((len(by_nuisance), estimate.basis.integrals.size))
@@ -576,7 +573,6 @@ def _division_map(
 ) -> DivisionMap:
     estimate = solution.estimate
     fields = solution.fields
-    basis = estimate.basis
     model = estimate.model
     a = deconvolution.conversion_constant
     r = deconvolution.g.r
@@ -591,18 +587,17 @@ def _division_map(
 
     # From changes of A G at its radii to those of A, G and its transfer function.
     by_radius = (np.eye(r.size) - np.multiply.outer(deconvolution.g.radial, rings)) / a
-    transfer = (bessel_table(wavenumbers, r) * rings) @ by_radius
-    normalised = np.vstack([rings, by_radius, transfer])
+    normalised = np.vstack([rings, by_radius, (bessel_table(wavenumbers, r) * rings) @ by_radius])
     gain = fields.gain(smoothed) if isinstance(fields, RasterFields) else smoothed.gain
     direct = normalised @ synthesis @ gain
     geometry = model.geometry(estimate.centres)
     nuisance = np.hstack([model.centre_derivative(geometry, estimate.kernel), model.drift_columns])
-    kernels = np.column_stack([estimate.kernel, basis.kernels(model.k)])
+    kernels = np.column_stack([estimate.kernel, estimate.basis.kernels(model.k)])
     count = kernels.shape[1] if estimate.points.u.size <= DENSE else _COLUMNS
     chunks = slices(kernels.shape[1], count)
     signals = (model.signal(geometry, kernels[:, chunk]) for chunk in chunks)
     kept = np.hstack([direct @ voltages for voltages in signals])
-    radial = np.column_stack([estimate.radial(r), basis.radial(r)])
+    radial = np.column_stack([estimate.radial(r), estimate.basis.radial(r)])
     places = slice(2, 2 + nuisance.shape[1])
     return DivisionMap(direct, nuisance, kept, normalised @ radial - kept, places)
 

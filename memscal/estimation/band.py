@@ -53,10 +53,9 @@ def find_band(estimate: ProfileEstimate, smoothed: SmoothedProfile | None) -> Ba
     error = np.maximum(transfer_uncertainty(estimate), TINY)
     clear = RELEVANT
     signal = np.abs((smoothed or estimate).spectrum.values)
-    points = estimate.points
     if smoothed is None:
         noise = error * estimate.conversion_constant * reference
-    elif points.as_raster:
+    elif estimate.points.as_raster:
         # Of all points of a raster the noise is equal at all wavenumbers.
         noise = np.asarray(np.linalg.norm(_shares(estimate) * estimate.noise))
         clear = RELEVANT_OF_RASTER
@@ -64,7 +63,7 @@ def find_band(estimate: ProfileEstimate, smoothed: SmoothedProfile | None) -> Ba
         noise = smoothed.noise
     noise = np.maximum(noise, TINY)
     # Nothing finer than two steps of the scan was sampled, whatever its signal.
-    sampled = np.pi / points.step
+    sampled = np.pi / estimate.points.step
     relevant = min(_falls_below(k, signal / noise, clear), sampled)
     ratio = gaussian_transfer(k, estimate.gaussian.sigma) / error
     lost = np.flatnonzero(ratio < RESOLVED)

@@ -181,8 +181,7 @@ class _Conditionals:
     def slopes(self) -> FloatArray:
         """Derivatives of the logarithms by the weighted data, (h, n)."""
         explained = _times(self.left, self.filter * self.singular * self.data)
-        rest = self.sensors.rest[self.family]
-        return (explained - rest) / self.variance[:, None]
+        return (explained - self.sensors.rest[self.family]) / self.variance[:, None]
 
     @property
     def means(self) -> FloatArray:
@@ -327,8 +326,7 @@ def weigh_departures(
     prior[count:, : curvatures.shape[1]] = curvatures
     columns = np.vstack([columns, prior])
     data = np.concatenate([data, np.zeros(count), left])
-    size = len(prior)
-    noise = _Noise(effective_count + size - basis.flat, expected_noise**2, least_noise**2)
+    noise = _Noise(effective_count + len(prior) - basis.flat, expected_noise**2, least_noise**2)
     sizes = tuple(ring.radius.size for ring in basis.rings)
     choice = _choice(basis.flat, sizes, tuple(fitted.family for fitted in basis.families))
     given = _Conditionals.of(_Sensors.of(basis, columns, data), columns, choice, noise)

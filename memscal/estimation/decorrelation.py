@@ -28,8 +28,7 @@ class Decorrelation:
 
     def adjoint(self, values: FloatArray) -> FloatArray:
         """The transposed transformation of columns."""
-        common = _scaled(self.common[::-1], values, 1.0)
-        return self._by_blocks(_solved, common, transposed=True)
+        return self._by_blocks(_solved, _scaled(self.common[::-1], values, 1.0), transposed=True)
 
     def correlate(self, white: FloatArray) -> FloatArray:
         """Give white noise the correlation: the inverse of :meth:`apply`."""

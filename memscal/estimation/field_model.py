@@ -112,8 +112,7 @@ class FieldModel(ForwardModel):
         angle = m * np.arctan2(self._plane.ky, self._plane.kx)
         even = np.cos(angle) * self._on_cells(cosines.T)
         odd = np.sin(angle) * self._on_cells(sines.T)
-        spectra = (-1j) ** m * np.vstack([even, odd])
-        return self._read(geometry, spectra)
+        return self._read(geometry, (-1j) ** m * np.vstack([even, odd]))
 
     def spotted(self, places: FloatArray, width: float, centres: FloatArray) -> FloatArray:
         """Voltages of Gaussians of unit integral at places (2, m) from centres, in m: (n, m)."""
@@ -127,8 +126,7 @@ class FieldModel(ForwardModel):
         """Interpolate kernels (m, nodes) to the cells of the plane."""
         from scipy.interpolate import CubicSpline
 
-        wavenumbers = np.hypot(self._plane.ky, self._plane.kx)
-        return CubicSpline(self.k, kernels, axis=1)(wavenumbers)
+        return CubicSpline(self.k, kernels, axis=1)(np.hypot(self._plane.ky, self._plane.kx))
 
     def _read(self, geometry: Geometry, spectra: Any) -> FloatArray:
         """Read voltages (n, k) or (n, m, k) at the points for k transforms on the cells."""

@@ -152,8 +152,7 @@ def _robust_start_of_scan(model: ForwardModel, weights: FloatArray) -> ArrayTrip
         # The potential of a shear looks much as the normal stress does.
         potentials = wavenumbers.synthesise(spectra / model.k[:, None], radii).T
         even = [np.interp(distances, radii, table) * factors for table in potentials]
-        even_trials = _amplitudes(np.concatenate(even), data, drift)
-        _require_parity(points, (amplitudes, costs), even_trials)
+        _require_parity(points, (amplitudes, costs), _amplitudes(np.concatenate(even), data, drift))
     i = int(np.argmin(np.where(amplitudes > 0, costs, np.inf)))
     if not amplitudes[i] > 0:
         raise _undetermined(model)
@@ -244,15 +243,13 @@ class GaussianFit:
 
     def shifts(self, columns: FloatArray) -> FloatArray:
         """Of columns (n, p) by the parameters, shifts of all scans along x and along y, (n, 2)."""
-        axis = np.nonzero(self.points.free)[1]
-        return columns[:, self.points.centres] @ np.eye(2)[axis]
+        return columns[:, self.points.centres] @ np.eye(2)[np.nonzero(self.points.free)[1]]
 
     @property
     def prior(self) -> ArrayPair:
         """Further rows (c, p) of the jacobian by the curvatures' prior, and their residuals."""
         rows = self.points.prior_rows[:, : self.jacobian.shape[1]]
-        curvature = self.drift[self.drift.size - len(rows) :]
-        return rows, -rows.sum(axis=1) * curvature
+        return rows, -rows.sum(axis=1) * self.drift[self.drift.size - len(rows) :]
 
     def has_width(self, weights: FloatArray, noise: float) -> bool:
         """Whether the width is distinct from zero, where its slopes vanish."""
@@ -277,8 +274,7 @@ class GaussianFit:
     def gain(self, weights: FloatArray) -> VoltageMap:
         """Derivative of the parameters by the voltages, shape (p, n)."""
         covariance = self.covariance(weights, 1.0)
-        standardised = self.points.standardised(self.jacobian, weights)
-        right = self.points.unstandardise(standardised, weights)
+        right = self.points.unstandardise(self.points.standardised(self.jacobian, weights), weights)
         return VoltageMap(((covariance, right),))
 
 
@@ -286,12 +282,11 @@ def fit_gaussian_to_points(
     model: ForwardModel, weights: FloatArray, start: GaussianFit | None = None
 ) -> GaussianFit:
     """Fit a Gaussian by weighted least squares, from an earlier fit or a robust global search."""
-    points = model.points
     robust = start is None
     if robust and weights.size > MOST_AT_START:
         # They give the start for all.
-        chosen = some_points(points)
-        some = replace(model, points=points.selected(chosen))
+        chosen = some_points(model.points)
+        some = replace(model, points=model.points.selected(chosen))
         start = fit_gaussian_to_points(some, weights[chosen])
     theta = _robust_start(model, weights) if start is None else start.theta
     return _solve(model, weights, theta, robust)
@@ -391,9 +386,8 @@ def linearise(model: ForwardModel, theta: FloatArray) -> GaussianFit:
     signal = columns[:, :1]
     by_shape = amplitude * columns[:, 1 : 2 + points.ellipse]
     centring = model.by_free_centres(shift)
-    baseline = model.drift_columns
-    jacobian = np.hstack([signal, by_shape[:, :1], centring, baseline, by_shape[:, 1:]])
-    predicted = amplitude * columns[:, 0] + baseline @ drift
+    jacobian = np.hstack([signal, by_shape[:, :1], centring, model.drift_columns, by_shape[:, 1:]])
+    predicted = amplitude * columns[:, 0] + model.drift_columns @ drift
     return GaussianFit(
         theta, amplitude, sigma, centre, drift, ellipticity, points, geometry, jacobian, predicted
     )

@@ -52,8 +52,7 @@ def hold_out(estimate: ProfileEstimate, group: IndexArray) -> HeldOut | None:
     # Clipped: many outliers in one group count together, and a single one counts little.
     model = residuals.free_model(estimate, clip_outliers=True)
     # Centre, baseline and drift are fitted to a held-out group by itself.
-    straight = estimate.model.straight_columns.shape[1]
-    nuisances = slice(2, estimate.points.centres.stop + straight)
+    nuisances = slice(2, estimate.points.centres.stop + estimate.model.straight_columns.shape[1])
     count = int(group.max()) + 1
     # Of too many groups, neighbouring ones are joined.
     fold = (group * min(count, _MOST_FOLDS) // count)[model.point]
@@ -139,24 +138,22 @@ def linearity_test(estimate: ProfileEstimate) -> ExtraColumns | None:
 
 def _widened(estimate: ProfileEstimate, factors: tuple[float, ...]) -> FloatArray:
     """Profiles of Gaussians of several widths, shape (n, factors): smooth test functions."""
-    model = estimate.model
     fit = estimate.gaussian
-    kernels = gaussian_transfer(model.k[:, None], fit.width * np.array(factors))
-    return model.signal(fit.geometry, kernels)
+    kernels = gaussian_transfer(estimate.model.k[:, None], fit.width * np.array(factors))
+    return estimate.model.signal(fit.geometry, kernels)
 
 
 def _add(estimate: ProfileEstimate, columns: FloatArray) -> ExtraColumns:
     """Fit the columns together with a round Gaussian, the departures subtracted as estimated."""
-    points = estimate.points
     weights = estimate.weights / estimate.noise_scale**2
     scale = np.abs(columns).max(axis=0)
     columns = columns / scale
     jacobian = estimate.gaussian.jacobian
-    count = jacobian.shape[1] - points.ellipse
+    count = jacobian.shape[1] - estimate.points.ellipse
     gaussian = jacobian[:, :count] / np.linalg.norm(jacobian[:, :count], axis=0)
     left = (estimate.weighed.residual + estimate.oval)[:, None]
     # What the triangular factor has below the rows of the round columns is free of them.
-    root = triangular(points.standardised(np.hstack([gaussian, columns, left]), weights))
+    root = triangular(estimate.points.standardised(np.hstack([gaussian, columns, left]), weights))
     free = root[count:, count:-1]
     residual = root[count:, -1]
     coefficients = np.linalg.lstsq(free, residual, rcond=None)[0]

@@ -43,8 +43,7 @@ def point_weights(
     if points.planar:
         standardised = isolated(points, residual) * root
         # Errors of the stage make more noise where the voltage is steep.
-        nearby = _NORMAL * median_nearby(points, np.abs(standardised))
-        scale = np.maximum(scale, nearby)
+        scale = np.maximum(scale, _NORMAL * median_nearby(points, np.abs(standardised)))
     z = np.abs(standardised) / scale
     return np.minimum(1.0, (threshold / np.maximum(z, threshold)) ** 4)
 
@@ -97,8 +96,7 @@ def _third_differences(points: ScanPoints, chosen: IndexArray) -> Any:
     from scipy.sparse import csr_array
 
     keys = np.stack([points.x, points.place_numbers("row"), points.repeat, points.scan])
-    order = chosen[np.lexsort(keys[:, chosen])]
-    four = np.lib.stride_tricks.sliding_window_view(order, 4)
+    four = np.lib.stride_tricks.sliding_window_view(chosen[np.lexsort(keys[:, chosen])], 4)
     gaps = np.diff(points.x[four], axis=1)
     together = np.all(keys[1:, four[:, :1]] == keys[1:, four], axis=(0, 2))
     four = four[together & (gaps.max(axis=1) < _UNEVEN * gaps.min(axis=1))]

@@ -65,16 +65,14 @@ def free_model(estimate: ProfileEstimate, *, clip_outliers: bool = False) -> Fre
     u = points.u
     if clip_outliers:
         most = _CLIPPED * estimate.noise
-        clipped = estimate.predicted + np.clip(u - estimate.predicted, -most, most)
-        u = np.where(ordinary, u, clipped)
+        u = np.where(ordinary, u, estimate.predicted + np.clip(u - estimate.predicted, -most, most))
         ordinary = np.ones_like(ordinary)
     weights = np.where(ordinary, weights, estimate.weights)
     point = np.flatnonzero(ordinary)
     fit = estimate.gaussian
     model = estimate.model
     kernels = basis.kernels(model.k)[:, basis.flat :]
-    scaled = fit.jacobian / np.linalg.norm(fit.jacobian, axis=0)
-    first = [(u - fit.predicted)[:, None], scaled]
+    first = [(u - fit.predicted)[:, None], fit.jacobian / np.linalg.norm(fit.jacobian, axis=0)]
     if basis.angular:
         first.append(basis.angular.components.signal(model, fit.centre))
     columns, mix = model.framed(fit.geometry, first)

@@ -129,8 +129,7 @@ def hysteresis_test(estimate: ProfileEstimate) -> BranchesApart | None:
     mean = np.bincount(points.scan, sign) / np.bincount(points.scan)
     both = np.abs(mean)[points.scan] < np.abs(sign)
     if both.any():
-        shift = model.shift_derivative(geometry, estimate.kernel)
-        columns += [both * points.along(shift), both]
+        columns += [both * points.along(model.shift_derivative(geometry, estimate.kernel)), both]
     fit = _Fit.of(estimate, sign[:, None] * np.stack(columns, axis=1))
     if fit is None:
         return None
@@ -198,8 +197,7 @@ def compare_runs(estimate: ProfileEstimate) -> RunsApart | None:
     if count == 1:
         return None
     own = np.equal.outer(number, np.arange(count)).astype(np.float64)
-    gains = own[:, 1:] * estimate.signal[:, None]
-    fit = _Fit.of(estimate, np.hstack([gains, own]))
+    fit = _Fit.of(estimate, np.hstack([own[:, 1:] * estimate.signal[:, None], own]))
     if fit is None:
         return None
     # A run's baseline is its scan's and its own, whatever share of both is which.

@@ -29,9 +29,8 @@ _MOST = 1000
 
 def slow_noise(estimate: ProfileEstimate, residuals: Residuals) -> SlowNoise | None:
     """Average the noise's covariance over its correlation; none of rasters, or if it is stated."""
-    points = estimate.points
     place = residuals.place
-    known = points.planar or points.decorrelation or place.size > _MOST
+    known = estimate.points.planar or estimate.points.decorrelation or place.size > _MOST
     if known or residuals.degrees < FEWEST_RESIDUALS:
         return None
     apart = np.abs(np.subtract.outer(place, place))

@@ -127,8 +127,7 @@ def _gram(first: Any, second: Any, scale: FloatArray | None = None) -> FloatArra
 
 def evenly(rows: NDArray[Any], most: int) -> NDArray[Any]:
     """At most so many of the rows, evenly chosen."""
-    count = min(rows.size, most)
-    return rows[np.linspace(0, rows.size - 1, count).astype(np.intp)]
+    return rows[np.linspace(0, rows.size - 1, min(rows.size, most)).astype(np.intp)]
 
 
 def triangular(columns: FloatArray) -> FloatArray:

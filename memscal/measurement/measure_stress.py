@@ -60,7 +60,6 @@ def stress_checks(
     for number, (profile, others) in enumerate(zip(profiles, restored, strict=True), start=1):
         allowed = math.hypot(*_relative(profile).values(), restore.NEGLIGIBLE_FORCE)
         off = abs(profile.force / profile.load - 1) / allowed
-        p_value = math.erfc(off / math.sqrt(2))
         force = check(
             "applied_force",
             off,
@@ -68,7 +67,7 @@ def stress_checks(
             f"Difference of the profile's total force, {profile.force:.4g} N, from the applied "
             f"load of {profile.load:.4g} N, over its standard uncertainty of "
             f"{allowed * profile.load:.2g} N. {_FORCE}",
-            p_value,
+            math.erfc(off / math.sqrt(2)),
         )
         for own in (force, *others):
             meaning = f"{profile.label}: {own.meaning}"

@@ -106,8 +106,7 @@ def _signals_of_path(loads: Sequence[Scan], apparatus: ApparatusFunction) -> lis
         # Without friction both are the frictionless contact.
         below, at, above = np.moveaxis(voltages[[0, -1]], 1, 0)
         by_load = (above - below) / (2 * _LOAD_STEP)
-        contact_radius = paths[0][three[1]].contact_radius
-        signals.append(ContactSignal(r, at, by_load, contact_radius))
+        signals.append(ContactSignal(r, at, by_load, paths[0][three[1]].contact_radius))
     return signals
 
 
@@ -301,12 +300,10 @@ def _scaled(correlation: FloatArray, factors: FloatArray) -> FloatArray:
 def _electronic_noise(found: _Found, load_noise: FloatArray) -> float:
     """Noise beside that of the loads, by maximum likelihood of the residuals."""
     residual = found.residual
-    count = residual.size
     # The fitted parameters lower the scatter of the residuals.
-    square = found.weight * residual**2 * count / max(count - found.parameters, 1)
+    square = found.weight * residual**2 * residual.size / max(residual.size - found.parameters, 1)
     scatter = 1.4826 * np.median(np.abs(residual))
-    largest = np.abs(found.signal).max()
-    tried = np.maximum(_TRIED * scatter, NUMERICAL_FLOOR * largest)
+    tried = np.maximum(_TRIED * scatter, NUMERICAL_FLOOR * np.abs(found.signal).max())
     variance = tried[:, None] ** 2 + load_noise**2
     deviance = np.sum(np.log(variance) + square / variance, axis=1)
     return float(tried[np.argmin(deviance)])
@@ -436,14 +433,13 @@ def _place_roots(restored: Restoration, average: Any) -> Arrays:
     """Roots of the covariance that centre, baseline and drift bring, shared out without a rest."""
     posterior = restored.posterior
     model = posterior.estimate.model
-    nodes = posterior.nodes
     film = film_transfer(restored.scan.set_up.expected, model.reference.wavenumbers)
     pressure = posterior.stress / restored.scan.stated_load / film
     a = restored.apparatus.conversion_constant
     geometry = model.geometry(np.atleast_2d(restored.centre))
     by_centre = average @ model.centre_derivative(geometry, pressure) / a
     by_drift = average @ model.drift_columns / a
-    covariance = posterior.covariance[nodes:, nodes:]
+    covariance = posterior.covariance[posterior.nodes :, posterior.nodes :]
     n = by_centre.shape[1]
     carried = np.linalg.solve(covariance[:n, :n], covariance[:n, n:])
     left = covariance[n:, n:] - covariance[n:, :n] @ carried
@@ -456,10 +452,9 @@ def _on_axis(restored: Restoration) -> tuple[float, Mapping[str, float]]:
     """Return the blurred stress on the axis and its standard uncertainty by source, in Pa."""
     posterior = restored.posterior
     apparatus = restored.apparatus
-    wavenumbers = posterior.wavenumbers
     nodes = posterior.nodes
-    k = wavenumbers.k
-    on_axis = wavenumbers.synthesise(np.eye(nodes), np.zeros(1))[0]
+    k = posterior.wavenumbers.k
+    on_axis = posterior.wavenumbers.synthesise(np.eye(nodes), np.zeros(1))[0]
     transfer, _ = sensor_changes(apparatus, k)
     row = on_axis * transfer
     changes = {source: row @ columns[:nodes] for source, columns in posterior.changes.items()}

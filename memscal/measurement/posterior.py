@@ -78,8 +78,7 @@ def film_transfer(set_up: SetUp, wavenumbers: Wavenumbers) -> FloatArray:
 
 
 def _linear_transfer(set_up: SetUp, wavenumbers: Wavenumbers) -> RadialSpectrum:
-    film = set_up.film
-    values, _ = base_response(wavenumbers.k * film.thickness, film.poisson_ratio)
+    values, _ = base_response(wavenumbers.k * set_up.film.thickness, set_up.film.poisson_ratio)
     return RadialSpectrum(wavenumbers, values)
 
 
@@ -129,8 +128,7 @@ def _three_orders(m: float, nodes: bytes, width: float) -> ArrayTriple:
 @lru_cache(maxsize=16)
 def _shear_ratio(film: ElasticFilm, k: bytes) -> FloatArray:
     """Normal stress at the base by a shear on the film over that by a pressure, at ``k``."""
-    x = np.frombuffer(k) * film.thickness
-    by_pressure, by_shear = base_response(x, film.poisson_ratio)
+    by_pressure, by_shear = base_response(np.frombuffer(k) * film.thickness, film.poisson_ratio)
     return by_shear / by_pressure
 
 
@@ -181,8 +179,7 @@ def _averaged_departures(start: ProfileEstimate, weighing: Weighing) -> _Pressur
     fit = weighing.reduced.fit
     weighed = weighing.average()
     kernels = weighing.basis.kernels(model.k)
-    unchanged = np.eye(weighing.basis.flat, kernels.shape[1])
-    rows = np.vstack([kernels, unchanged[2:]])
+    rows = np.vstack([kernels, np.eye(weighing.basis.flat, kernels.shape[1])[2:]])
     pressure = fit.conversion_constant * kernels[:, 0]
     fitted = np.concatenate([pressure, fit.centre[model.points.free], fit.drift])
     growth = start.adopted_noise(weighed.noise) / weighed.noise
@@ -251,8 +248,7 @@ def fitted_shapes(shapes: Sequence[PressureShape], start: ProfileEstimate) -> li
         columns = _shape_columns(shapes, start, forces, widths)
         columns[..., 1:-drift] *= width
         flat = points.standardised(columns.reshape(data.size, -1), start.weights)
-        by_shape = np.moveaxis(flat.reshape(columns.shape), 1, 0)
-        inverse = np.linalg.pinv(by_shape)
+        inverse = np.linalg.pinv(np.moveaxis(flat.reshape(columns.shape), 1, 0))
         forces, steps, *_ = (inverse @ data).T
         # A step that turns back is half as long as the last, so that no width swings for ever.
         ahead = steps * width / widths
@@ -390,8 +386,7 @@ def posterior_of(
         covariances[source] = change @ change.T
     variance = sum(np.diag(covariance)[:nodes] for covariance in covariances.values())
     gaussian = scan.stated_load * film * gaussian_transfer(model.k, estimate.gaussian.sigma)
-    uncertainty = np.sqrt(np.maximum(variance, 0.0))
-    lost = _RESOLVED * uncertainty > gaussian
+    lost = _RESOLVED * np.sqrt(np.maximum(variance, 0.0)) > gaussian
     resolved = model.k[int(np.argmax(lost)) if lost.any() else -1]
     return Posterior(
         estimate=estimate,
@@ -421,8 +416,7 @@ def _signals(estimate: ProfileEstimate, state: FloatArray, changes: FloatArray) 
     model = estimate.model
     columns = np.zeros((model.points.u.size, changes.shape[1]))
     for i, change in enumerate(changes.T):
-        reference = RadialSpectrum(model.reference.wavenumbers, change)
-        changed = replace(model, references=(reference,))
+        changed = replace(model, references=(RadialSpectrum(model.reference.wavenumbers, change),))
         columns[:, i] = changed.signal(estimate.gaussian.geometry, kernel)
     return columns
 
@@ -463,8 +457,7 @@ def input_changes(apparatus: ApparatusFunction, names: Iterable[str], k: FloatAr
     known = tuple(name for name in names if name in apparatus.kernel_changes)
     if not known:
         return {}
-    changes = _kernel_changes(apparatus, k.tobytes(), known)
-    return dict(zip(known, changes, strict=True))
+    return dict(zip(known, _kernel_changes(apparatus, k.tobytes(), known), strict=True))
 
 
 @lru_cache(maxsize=16)
