@@ -25,13 +25,13 @@ class Dimension(NamedTuple):
     si: str
     stored: str
     shown: str
-    scale: float
+    scale: float = 1.0
 
 
 DIMENSIONS = {
     "length": Dimension("m", "mm", "mm", MM),
     "voltage": Dimension("V", "mV", "mV", MV),
-    "force": Dimension("N", "N", "N", 1.0),
+    "force": Dimension("N", "N", "N"),
     "stress": Dimension("Pa", "Pa", "kPa", KPA),
     "stress squared": Dimension("Pa^2", "Pa^2", "kPa²", KPA**2),
     "voltage per stress": Dimension("V/Pa", "mV/Pa", "mV/Pa", MV),
@@ -40,11 +40,11 @@ DIMENSIONS = {
     "per area squared": Dimension("1/m^4", "1/mm^4", "1/mm⁴", PER_MM2**2),
     "wavenumber": Dimension("rad/m", "rad/mm", "rad/mm", PER_MM),
     "voltage per length": Dimension("V/m", "mV/mm", "mV/mm", MV / MM),
-    "dimensionless": Dimension("1", "1", "", 1.0),
-    "angle": Dimension("rad", "rad", "rad", 1.0),
-    "energy": Dimension("J", "J", "J", 1.0),
-    "temperature": Dimension("K", "K", "K", 1.0),
-    "time": Dimension("s", "s", "s", 1.0),
+    "dimensionless": Dimension("1", "1", ""),
+    "angle": Dimension("rad", "rad", "rad"),
+    "energy": Dimension("J", "J", "J"),
+    "temperature": Dimension("K", "K", "K"),
+    "time": Dimension("s", "s", "s"),
     "stress per length": Dimension("Pa/m", "MPa/mm", "MPa/mm", 1e9),
 }
 
@@ -100,7 +100,7 @@ class Quantity:
     @property
     def _units(self) -> Dimension:
         name = self.dimension
-        return DIMENSIONS.get(name) or Dimension(name, name, name, 1.0)
+        return DIMENSIONS.get(name) or Dimension(name, name, name)
 
     @property
     def unit(self) -> str:
