@@ -12,8 +12,15 @@ from memscal.formats.groups import read_record, write_record
 from memscal.formats.hdf5.reader import SafeFile
 from memscal.formats.hdf5.writer import ARTIFACT_SCHEMA, Group, file_tree, si, to_json, write_tree
 from memscal.formats.units import reading_of
-from memscal.model import apparatus, records
-from memscal.model.apparatus import ApparatusData, ApparatusField, ApparatusRadial
+from memscal.model import records
+from memscal.model.apparatus import (
+    ApparatusData,
+    ApparatusField,
+    ApparatusRadial,
+    OtherEstimate,
+    Reconvolution,
+    TransferFunction,
+)
 from memscal.model.arrays import Arrays
 from memscal.model.notation import Reading
 
@@ -40,10 +47,8 @@ def artifact_from(file: SafeFile) -> ApparatusData:
     return ApparatusData(
         plane=plane,
         radial_profile=_read_radial(file, "/entry/radial_profile", "/entry/radial_covariance"),
-        transfer=apparatus.TransferFunction(**transfer),
-        reconvolution=apparatus.Reconvolution(
-            **read_record(reconvolution, file, "/entry/reconvolution")
-        ),
+        transfer=TransferFunction(**transfer),
+        reconvolution=Reconvolution(**read_record(reconvolution, file, "/entry/reconvolution")),
         parameters=groups.read_parameters(file, "/entry/parameters", reading),
         budget=groups.read_budget(file, "/entry/parameters/budget"),
         checks=groups.read_quality(file),
@@ -117,13 +122,13 @@ def _read_changes(file: SafeFile) -> Arrays:
     return dict(zip(names, read, strict=True))
 
 
-def _read_other(file: SafeFile, reading: Reading) -> apparatus.OtherEstimate | None:
+def _read_other(file: SafeFile, reading: Reading) -> OtherEstimate | None:
     """Read the estimate by the route that was not chosen; a division is one by white noise."""
     for route, method in (("bayesian", "bayesian"), ("division", "white-noise")):
         places = [f"/entry/{name}_{route}" for name in ("radial_profile", "radial_covariance")]
         if file.has(places[0]):
             parameters = groups.read_parameters(file, f"/entry/parameters_{route}", reading)
-            return apparatus.OtherEstimate(method, parameters, _read_radial(file, *places))
+            return OtherEstimate(method, parameters, _read_radial(file, *places))
     return None
 
 

@@ -1,6 +1,11 @@
 """Laws of the interface and their evidence, as tables and as JSON."""
 
-from memscal.extensions.interface_laws import results
+from memscal.extensions.interface_laws.results import (
+    ImpliedFriction,
+    InterfaceComparison,
+    InterfaceLaw,
+    LawComparison,
+)
 from memscal.friction.results import INTERVAL, VALUE
 from memscal.model.arrays import FloatArray, Values
 from memscal.model.quantities import KPA, Quantity
@@ -30,7 +35,7 @@ IMPLIED = (
 _STIFFNESS = IMPLIED[-1]
 
 
-def tables(comparison: results.InterfaceComparison) -> list[Table]:
+def tables(comparison: InterfaceComparison) -> list[Table]:
     """Return evidence and lengths, and what a slip length means at each load."""
     shown = []
     for direction, compared in comparison.by_direction.items():
@@ -40,7 +45,7 @@ def tables(comparison: results.InterfaceComparison) -> list[Table]:
     return shown
 
 
-def _law_table(direction: str, compared: results.LawComparison) -> Table:
+def _law_table(direction: str, compared: LawComparison) -> Table:
     """Return the evidence of each law."""
     best = max(law.log_evidence for law in compared.laws)
     title = (
@@ -55,14 +60,14 @@ def _law_table(direction: str, compared: results.LawComparison) -> Table:
     return Table(title, ["law", "best", "ln of evidence", "χ²/ν", "p"], rows)
 
 
-def _best(compared: results.LawComparison, law: results.InterfaceLaw) -> str:
+def _best(compared: LawComparison, law: InterfaceLaw) -> str:
     """Return the free parameters where the likelihood is largest; the last law's is a length."""
     if law is compared.laws[-1]:
         return ", ".join(f"{value / SLIP_LENGTH.scale:.3g} um" for value in law.best)
     return ", ".join(friction_name(float(f"{value:.3g}")) for value in law.best)
 
 
-def _length_table(direction: str, compared: results.LawComparison) -> Table:
+def _length_table(direction: str, compared: LawComparison) -> Table:
     """Return the length, and the evidence for the law that yields against each other one."""
     words = "slip length" if direction == "tangential" else "length"
     rows = []
@@ -85,7 +90,7 @@ def _length_table(direction: str, compared: results.LawComparison) -> Table:
     return Table(title, ["law", "Bayes factor", "evidence", "ln of likelihoods"], rows)
 
 
-def _implied_table(implied: results.ImpliedFriction) -> Table:
+def _implied_table(implied: ImpliedFriction) -> Table:
     """Return what the slip length means at each load."""
     rows = []
     for load, friction, pressure, stiffness in zip(*vars(implied).values(), strict=True):
@@ -103,7 +108,7 @@ def _between(ends_about_best: FloatArray) -> str:
     return f"{friction_name(best)} [{low}, {high}]"
 
 
-def mapping(comparison: results.InterfaceComparison) -> Values:
+def mapping(comparison: InterfaceComparison) -> Values:
     """Return laws, evidence and lengths as JSON holds them."""
     whole = {}
     for direction, compared in comparison.by_direction.items():
@@ -121,7 +126,7 @@ def _held(names: tuple[str, ...], record: object) -> Values:
     return {name: plain(getattr(record, name)) for name in names}
 
 
-def _implied_json(implied: results.ImpliedFriction) -> list[Values]:
+def _implied_json(implied: ImpliedFriction) -> list[Values]:
     names = [quantity.name for quantity in IMPLIED]
     rows = zip(*vars(implied).values(), strict=True)
     return [members(IMPLIED, implied, **dict(zip(names, row, strict=True))) for row in rows]
