@@ -78,8 +78,7 @@ def weigh_slip_length(
     name = "effective Amontons, one coefficient"
     laws = [one_of_all(name, curve(rigid), friction_prior, degrees)]
     if len(rigid.points) > 1:
-        loads = range(len(rigid.points))
-        curves = [curve(rigid.only([i]), fine=_FINER) for i in loads]
+        curves = [curve(rigid.only([i]), fine=_FINER) for i in range(len(rigid.points))]
         name = "effective Amontons, one for each load"
         laws.append(one_of_each(name, curves, friction_prior, degrees))
     along = curve(slipping, also=np.geomspace(*_SLIP_LENGTHS_CALCULATED, _LENGTHS))
@@ -312,11 +311,8 @@ def _best_of_each(loads: Sequence[Statistics]) -> tuple[list[int], float, float]
     for _ in range(_SWEEPS):
         before = top
         for j, load in enumerate(loads):
-            several = [load]
-            for i, other in enumerate(loads):
-                if i != j:
-                    several.append(other.at(chosen[i]))
-            logs, chi_square = log_likelihood(added(several))
+            others = [other.at(chosen[i]) for i, other in enumerate(loads) if i != j]
+            logs, chi_square = log_likelihood(added([load, *others]))
             chosen[j] = int(np.argmax(logs))
             top = float(logs[chosen[j]])
             least = float(chi_square[chosen[j]])
@@ -340,10 +336,9 @@ def implied_friction(
     values = unbounded(t, rigid.family.scale)
     curves = _maxima(rigid, values)
     maxima = _maxima(slipping, lengths)
-    implied = np.empty((order.size, lengths.size))
-    for (i, j), _ in np.ndenumerate(implied):
-        load = order[i]
-        implied[i, j] = _read(values, curves[:, load], float(maxima[j, load]))
+    implied = np.array(
+        [[_read(values, curves[:, load], top) for top in maxima[:, load]] for load in order]
+    )
     family = slipping.family
     areas = np.pi * family.at(length.best).contact_radii[0] ** 2
     pressures = (family.loads / areas)[order]
