@@ -26,13 +26,7 @@ from memscal.model.arrays import (
     keyword_array_record,
     keyword_value_record,
 )
-from memscal.model.checks import (
-    NOISE_UNSTATED,
-    Checked,
-    Messages,
-    QualityChecks,
-    state_of_checks,
-)
+from memscal.model.checks import NOISE_UNSTATED, Checked, Messages, QualityChecks, state_of_checks
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import RoundIndenter
 from memscal.model.instrument import Equipment, LoadCell, StressSensor
@@ -333,16 +327,15 @@ class MeasuredStress(Result, Checked, ByContent):
         hook("write_stress")(self, path, overwrite=overwrite)
 
 
-def _kept(value: float) -> float:
-    """Round a length or voltage to a number that a file's unit gives back."""
-    return float(value) * _FILE_SCALE / _FILE_SCALE
-
-
 def _kept_record(record: Record, *lengths: str) -> Record:
-    """Round the lengths of a film or an indenter, and their uncertainties."""
+    """Round lengths of a film or an indenter to numbers that a file's unit gives back."""
     names = [name + end for name in lengths for end in ("", "_uncertainty")]
     stated = {name: getattr(record, name) for name in names}
-    kept: Any = {name: _kept(value) for name, value in stated.items() if value is not None}
+    kept: Any = {
+        name: float(value) * _FILE_SCALE / _FILE_SCALE
+        for name, value in stated.items()
+        if value is not None
+    }
     return replace(record, **kept)
 
 
