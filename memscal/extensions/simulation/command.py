@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import fields, replace
+from dataclasses import replace
 from inspect import signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -103,16 +103,19 @@ def _settings(function: Callable[..., Any], options: Options) -> Options:
     """Return the arguments that options are of a function, by their names."""
     from memscal.extensions.simulation.disturbances import Disturbances
 
-    names = [item.name for item in fields(Disturbances) if item.name in options]
-    stated = {name: options[name] for name in names}
+    stated = _arguments(Disturbances, options)
     stated["centre"] = (options["centre"], options["centre_y"])
     return {
-        **{name: options[name] for name in signature(function).parameters if name in options},
+        **_arguments(function, options),
         "film": film_from(options),
         "rod": indenter_from("rod", options),
         "kernel": kernel_from(options),
         "disturbances": Disturbances(**stated),
     }
+
+
+def _arguments(function: Callable[..., Any], options: Options) -> Options:
+    return {name: options[name] for name in signature(function).parameters if name in options}
 
 
 def _print_truth(scans: Mapping[Path, Scan], title: str) -> None:

@@ -14,11 +14,7 @@ from memscal.extensions.simulation.contact_scan import (
     described_film,
     simulate_contacts,
 )
-from memscal.extensions.simulation.disturbances import (
-    TYPICAL,
-    Disturbances,
-    Shear,
-)
+from memscal.extensions.simulation.disturbances import TYPICAL, Disturbances, Shear
 from memscal.extensions.simulation.rod_scan import PAPER_FILM, PAPER_ROD, simulate, without_law
 from memscal.mechanics.indent import Loading
 from memscal.mechanics.interface import Interface

@@ -8,16 +8,8 @@ import numpy as np
 
 from memscal.axisymmetry.kernels import RadialKernel
 from memscal.errors import InputError
-from memscal.extensions.simulation.disturbances import (
-    TYPICAL,
-    Disturbances,
-    Shear,
-)
-from memscal.extensions.simulation.sensor import (
-    blurred_stress,
-    simulated_scan,
-    simulated_sensor,
-)
+from memscal.extensions.simulation.disturbances import TYPICAL, Disturbances, Shear
+from memscal.extensions.simulation.sensor import blurred_stress, simulated_scan, simulated_sensor
 from memscal.friction.family import require_loads
 from memscal.mechanics.press_rod import press_rod
 from memscal.model.arrays import FloatArray, require_non_negative, require_range

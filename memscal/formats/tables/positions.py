@@ -37,10 +37,7 @@ def require_positions(named: Mapping[str, Any], layout: TableLayout) -> None:
 
 
 def make_positions(
-    columns: Columns,
-    layout: TableLayout,
-    notes: list[str],
-    name_rows: Callable[[Any], str],
+    columns: Columns, layout: TableLayout, notes: list[str], name_rows: Callable[[Any], str]
 ) -> int | None:
     """Make the positions that no column states; return how many presses were counted for it."""
     presses: int | None = None

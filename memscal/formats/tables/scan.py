@@ -11,11 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from memscal.errors import InputError, counted, require_names
 from memscal.extensions import hook
 from memscal.formats.tables.columns import NamedColumns, Wanted
-from memscal.formats.tables.positions import (
-    direction_of,
-    make_positions,
-    require_positions,
-)
+from memscal.formats.tables.positions import direction_of, make_positions, require_positions
 from memscal.formats.tables.reference import require_sign
 from memscal.formats.tables.sheets import open_table
 from memscal.formats.tables.stated import ScanConditions, ScanUncertainties, TableLayout
@@ -45,11 +41,7 @@ Column = str | int
 #: Dimension of a column, its unit as it is stated, the option that states it, and the default.
 Form = tuple[str, str | None, str, str | None]
 
-_RECORDS = {
-    "layout": TableLayout,
-    "conditions": ScanConditions,
-    "uncertainties": ScanUncertainties,
-}
+_RECORDS = {"layout": TableLayout, "conditions": ScanConditions, "uncertainties": ScanUncertainties}
 #: What of a layout is for who opens the table.
 _READING = ("sheet", "scan", "skip_rows", "missing", "delimiter", "decimal")
 #: Options that name columns, besides x and u.
