@@ -67,6 +67,9 @@ WRONG_USAGE = {
         "--reference"
     ),
     "batch . -o new --workers 1 --scheduler tcp://a:1": "exclude each other",
+    "summary . --tolerance A=2%,width=3%": "Known are A and sigma",
+    "summary . --tolerance A=2%,A=3%": "each once",
+    "summary . --tolerance A=2,5%": "with decimal points",
     "certificate sensor.apparatus.h5 --lab lab.toml": "--output",
     "certificate sensor.apparatus.h5 --lab lab.toml -o a.xml -o a.xml": "same name",
     "certificate sensor.apparatus.h5 --lab lab.toml -o c.txt": (

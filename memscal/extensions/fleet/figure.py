@@ -11,6 +11,7 @@ from memscal.extensions.fleet.results_summary import outliers, verdict
 from memscal.figures.report import Picture, Report
 from memscal.figures.style import (
     DECONVOLVED,
+    GAUSSIAN,
     MEASURED,
     MUTED,
     drawable,
@@ -36,6 +37,11 @@ def fleet_figure(fleet: FleetResults) -> Figure:
             label = f"{symbol} over {middle:.4g} {fleet.unit_of(symbol)}, less 1 (%)"
             change = 100 * (values / middle - 1)
             _distribution(upper, change, label.replace("sigma", "σ"))
+            if symbol in fleet.tolerances:
+                centre, allowed = fleet.allowed(symbol)
+                ends = 100 * (np.array([centre - allowed, centre + allowed]) / middle - 1)
+                upper.axvspan(*ends, color=GAUSSIAN, alpha=0.2, zorder=0, label="tolerance")
+                legend_above(upper)
             _places(lower, fleet, change, label.replace("sigma", "σ"))
     return figure
 

@@ -27,6 +27,13 @@ class Failure(NamedTuple):
     cure: str
 
 
+class Tolerance(NamedTuple):
+    """By what share of a nominal value, or without one of the median, sensors may differ."""
+
+    share: float
+    nominal: float | None
+
+
 @keyword_array_record
 class FleetResults(Shown):
     """Sensors in the order of their batch; arrays have NaN where a scan has an error.
@@ -34,7 +41,8 @@ class FleetResults(Shown):
     ``conversion_constant`` is in ``unit``, ``gaussian_sigma`` and the places on a wafer are in mm,
     as in the files; ``failed`` has the names of the checks that failed, ``errors`` the errors, both
     by the number of the sensor; ``name`` is that of the folder of results.  ``messages`` say what
-    is missing, mixed, repeated or overridden, ``provenance`` how the batch was calibrated.
+    is missing, mixed, repeated or overridden, ``provenance`` how the batch was calibrated,
+    ``tolerances`` by symbol how far sensors that pass may be off.
     """
 
     paths: Sequence[str]
@@ -51,10 +59,17 @@ class FleetResults(Shown):
     name: str = "sensors"
     messages: tuple[Message, ...] = ()
     provenance: Values = field(default_factory=dict)
+    tolerances: Mapping[str, Tolerance] = field(default_factory=dict)
 
     def unit_of(self, symbol: str) -> str:
         """Return the unit of A or sigma."""
         return self.unit if symbol == "A" else "mm"
+
+    def allowed(self, symbol: str) -> tuple[float, float]:
+        """Return what the tolerance of A or sigma is about, and how far sensors may be from it."""
+        tolerance = self.tolerances[symbol]
+        centre = tolerance.nominal or median(getattr(self, SUMMARISED[symbol]))
+        return centre, tolerance.share * centre
 
 
 def median(values: FloatArray) -> float:

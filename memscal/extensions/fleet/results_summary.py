@@ -9,6 +9,7 @@ from pathlib import PurePath
 import numpy as np
 
 from memscal.extensions.fleet.results import SUMMARISED, FleetResults, median, robust_spread
+from memscal.extensions.fleet.tolerance import tolerance_mapping
 from memscal.extensions.fleet.wafer import FEWEST, deviations, trend
 from memscal.model.arrays import Values
 from memscal.model.notation import format_measured
@@ -39,10 +40,16 @@ def counts(fleet: FleetResults) -> Counts:
 
 
 def verdict(fleet: FleetResults) -> str:
-    """Return the counts as a sentence."""
+    """Return the counts as a sentence, and the yield as another one where there are tolerances."""
     number = counts(fleet)
     failed = f"{number['failed_checks']} failed one, {number['errors']} were not calibrated"
-    return f"{number['passed']} of {number['sensors']} sensors passed every check, {failed}."
+    text = f"{number['passed']} of {number['sensors']} sensors passed every check, {failed}."
+    if not fleet.tolerances:
+        return text
+    share = tolerance_mapping(fleet)["yield"]
+    return (
+        f"{text} Yield: {share['value']:.1%} ({share['low']:.1%} to {share['high']:.1%} at 95 %)."
+    )
 
 
 def failures(fleet: FleetResults) -> Counts:
@@ -89,7 +96,7 @@ def outliers(fleet: FleetResults) -> dict[int, str]:
 
 
 def tables(fleet: FleetResults) -> list[Table]:
-    """Return counts, distributions, failures, outliers, and how it was calibrated."""
+    """Return counts, distributions, tolerances, failures, outliers, and how it was calibrated."""
     far = "Outliers: beyond 5 robust deviations (more of few sensors) and u from"
     title = f"{far} {_CENTRES[_centre(fleet)]}, or a failed check"
     reasons = outliers(fleet)
@@ -108,6 +115,7 @@ def tables(fleet: FleetResults) -> list[Table]:
     return [
         Table("Sensors", ("", "number", "share"), _shares(fleet, counts(fleet))),
         _by_symbol("Distributions", {key: _distribution(fleet, key) for key in SUMMARISED}),
+        *_tolerance_tables(fleet),
         Table("Failed checks", ("check", "sensors", "share"), _shares(fleet, failures(fleet))),
         Table("Not calibrated", ("scans", "the first", "error", "problem", "cure"), errors),
         Table(title, ("sensor", "scan", f"A ({fleet.unit})", "sigma (mm)", "reason"), outlying),
@@ -119,6 +127,18 @@ def _shares(fleet: FleetResults, numbers: Counts) -> list[tuple[str, str, str]]:
     """Return numbers of sensors, each with its share of all."""
     total = len(fleet.paths)
     return [(name.replace("_", " "), str(n), f"{n / total:.2%}") for name, n in numbers.items()]
+
+
+def _tolerance_tables(fleet: FleetResults) -> list[Table]:
+    """Return why sensors pass or fail, and how many are near the middle or beyond."""
+    if not fleet.tolerances:
+        return []
+    found = tolerance_mapping(fleet)
+    title = "Within the tolerance; undecided: within U of a limit"
+    return [
+        Table("Yield", ("", "number", "share"), _shares(fleet, found["sensors"])),
+        _by_symbol(title, found["bins"]),
+    ]
 
 
 def _by_symbol(title: str, found: Mapping[str, Values]) -> Table:
@@ -133,7 +153,7 @@ def _by_symbol(title: str, found: Mapping[str, Values]) -> Table:
 
 
 def mapping(fleet: FleetResults) -> Values:
-    """Return counts, distributions, failures, the farthest outliers, provenance."""
+    """Return counts, distributions, tolerances, failures, the farthest outliers, provenance."""
     listed = [
         {"path": fleet.paths[i], "sensor": fleet.sensors[i], "reason": text}
         for i, text in list(outliers(fleet).items())[:_MOST_ROWS]
@@ -142,6 +162,7 @@ def mapping(fleet: FleetResults) -> Values:
         **counts(fleet),
         "checks": failures(fleet),
         **{name: _distribution(fleet, symbol) for symbol, name in SUMMARISED.items()},
+        "tolerances": tolerance_mapping(fleet) if fleet.tolerances else None,
         "warnings": texts_of(fleet.messages),
         "error_classes": dict(Counter(e.error_class for e in fleet.errors.values())),
         "error_groups": _error_groups(fleet),

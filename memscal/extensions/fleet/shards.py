@@ -136,6 +136,7 @@ _CHECK = ("value", "limit", "p_value")
 def arrow() -> Any:
     """Return the module pyarrow, or say how to get it."""
     installed("pyarrow", "A table of results", "fleet")
+    import pyarrow.csv
     import pyarrow.parquet
 
     return pyarrow

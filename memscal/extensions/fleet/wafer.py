@@ -1,4 +1,4 @@
-"""The wafer: its smooth trend, and how far sensors are from it."""
+"""The wafer: its smooth trend, how far sensors are from it, and rows and columns of places."""
 
 import numpy as np
 
@@ -11,6 +11,8 @@ _TERMS = 6
 #: Steps by which the weights of a robust fit settle, and where they stop to grow.
 _STEPS = 20
 _SMALL = 0.01
+#: Part of a pitch by which places may be rounded.
+_ROUNDING = 0.01
 
 
 def trend(fleet: FleetResults, values: FloatArray) -> FloatArray:
@@ -52,3 +54,10 @@ def deviations(fleet: FleetResults, name: str) -> FloatArray:
     spread[spread == 0] = median(u) or 1.0
     limit = np.where(placed, robust_limit(free), robust_limit(np.isfinite(values).sum()))
     return np.where(np.abs(distance) > limit * spread + u, distance / spread, 0.0)
+
+
+def lattice(places: FloatArray) -> FloatArray:
+    """Return rows or columns, whole numbers, of places: how many pitches they are from zero."""
+    known = np.unique(places[np.isfinite(places)].round(6))
+    pitch = min(np.diff(known), default=1.0)
+    return np.floor(places / pitch + _ROUNDING)

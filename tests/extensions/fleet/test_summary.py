@@ -1,13 +1,16 @@
-"""Summaries of fleets: outliers from the wafer's trend, errors by kind."""
+"""Summaries of fleets: outliers from the wafer's trend, tolerances, errors by kind."""
 
+import csv
+import io
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.stats import binom
 
-from memscal.extensions.fleet.results import Failure, FleetResults
-from memscal.extensions.fleet.results_summary import mapping, outliers
+from memscal.extensions.fleet.results import Failure, FleetResults, Tolerance
+from memscal.extensions.fleet.results_summary import mapping, outliers, verdict
+from memscal.extensions.fleet.tolerance import prober_table
 
 NOISE = 0.003
 
@@ -68,6 +71,53 @@ def test_the_summary_says_from_what_outliers_are_told():
     few = wafer(rng, 23)
     assert mapping(few)["outliers_from"] == "median"
     assert "a trend takes 24 calibrated sensors" in str(replace(few, failed={0: ("symmetry",)}))
+
+
+def test_tolerances_give_yield_bins_and_a_table_for_the_prober():
+    a = np.array([1.0, 1.01, 1.029, 1.05, 1.0, np.nan, 0.971, 1.0])
+    sigma = np.array([0.8, 0.8, 0.8, 0.7, 0.8, np.nan, 0.9, 0.8])
+    fleet = wafer(
+        np.random.default_rng(1),
+        8,
+        conversion_constant=a,
+        conversion_constant_errors=np.full(8, 0.001),
+        gaussian_sigma=sigma,
+        failed={4: ("symmetry",), 5: (), 6: ("symmetry",)},
+        errors={5: Failure("FormatError", "No.", "Do.")},
+        tolerances={"A": Tolerance(0.03, 1.0), "sigma": Tolerance(0.1, None)},
+        wafer_x=np.array([-7.5, -2.5, 2.5, 7.5, -7.5, -2.5, 2.5, np.nan]),
+        wafer_y=np.array([3.0, 3.0, 3.0, 3.0, 9.0, 9.0, 9.0, np.nan]),
+    )
+    rows = list(csv.DictReader(io.StringIO(prober_table(fleet).decode())))
+    reasons = ["", "", "", "A and sigma", "check", "error", "sigma and check", ""]
+    assert [row["reason"] for row in rows] == reasons
+    assert [row["result"] for row in rows] == ["fail" if reason else "pass" for reason in reasons]
+    assert [row["column"] for row in rows] == ["-2", "-1", "0", "1", "-2", "-1", "0", ""]
+    assert [row["row"] for row in rows[3:]] == ["0", "1", "1", "1", ""]
+    found = mapping(fleet)["tolerances"]
+    assert found["sensors"]["passed"] == 4
+    bins = found["bins"]["A"]
+    # 1.029 and 0.971 are within U = 0.002 of a limit.
+    assert (bins["within_half"], bins["within"], bins["within_double"]) == (4, 6, 7)
+    assert bins["undecided"] == 2
+    assert (found["bins"]["sigma"]["centre"], found["bins"]["sigma"]["within"]) == (0.8, 5)
+    assert "Yield: 50.0%" in verdict(fleet)
+
+
+@pytest.mark.parametrize("share", [0.5, 0.9, 0.98])
+def test_the_interval_of_the_yield_holds_it(share):
+    rng = np.random.default_rng(2)
+    held = 0
+    for passed in rng.random((200, 60)) < share:
+        fleet = wafer(
+            rng,
+            60,
+            conversion_constant=np.where(passed, 1.0, 2.0),
+            tolerances={"A": Tolerance(0.1, 1.0)},
+        )
+        found = mapping(fleet)["tolerances"]["yield"]
+        held += found["low"] <= share <= found["high"]
+    assert held >= binom.ppf(1e-3, 200, 0.92)  # near 1 it holds less often than 95 %
 
 
 def test_errors_that_differ_in_names_and_numbers_are_one_kind():
