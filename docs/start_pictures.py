@@ -94,9 +94,10 @@ def pipeline() -> plt.Figure:
         for seed, a in enumerate(truths)
     )
     results = list(memscal.calibrate_many(scans, method="bayesian"))
-    values = np.array([result.parameters["conversion_constant"] for result in results]) * 1e3 / 1e-4
+    values = np.array([result.apparatus.conversion_constant for result in results]) * 1e3 / 1e-4
     errors = [
-        result.parameters.uncertainty("conversion_constant") * 1e3 / 1e-4 for result in results
+        result.apparatus.parameters.uncertainty("conversion_constant") * 1e3 / 1e-4
+        for result in results
     ]
     middle = np.median(values)
     far = abs(values - middle) > 5 * 1.4826 * np.median(abs(values - middle))

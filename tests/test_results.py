@@ -65,11 +65,10 @@ def test_a_file_holds_both_estimates_and_a_is_that_of_the_method(scan, methods):
     assert memscal.measure_stress(contacts, loaded).conversion_constant == a
 
 
-def test_ufloats_have_the_covariance_of_the_parameters(calibration, loaded, scan):
+def test_ufloats_have_the_covariance_of_the_parameters(calibration, loaded):
     uncertainties = pytest.importorskip("uncertainties")
-    (fleet,) = memscal.calibrate_many([scan])
     own = calibration.apparatus.parameters
-    for result, parameters in ((calibration, own), (loaded, loaded.parameters), (fleet, own)):
+    for result, parameters in ((calibration, own), (loaded, loaded.parameters)):
         numbers = result.ufloats()
         assert tuple(numbers) == parameters.names
         scale = np.sqrt(np.diag(parameters.covariance))
@@ -103,23 +102,11 @@ def test_arrays_stand_on_their_axes_in_si_units(calibration, loaded):
     assert swept["seed_conversion_constant"].sizes == {"amplitude": 3, "draw": 2}
 
 
-def test_draws_and_scans_are_rows_of_data_frames(drawn, scan):
-    pandas = pytest.importorskip("pandas")
+def test_draws_are_rows_of_a_data_frame(drawn):
+    pytest.importorskip("pandas")
     draws = drawn.to_dataframe()
     np.testing.assert_allclose(draws["gaussian_sigma (m)"], drawn.samples[:, 1])
     assert draws.shape == drawn.samples.shape
-    fleet = list(memscal.calibrate_many([scan, "missing.h5"]))
-    rows = pandas.concat([result.to_dataframe() for result in fleet])
-    assert list(rows.index) == [0, 1]
-    u = fleet[0].parameters.uncertainty("conversion_constant")
-    assert rows["u(conversion_constant) (V/Pa)"][0] == pytest.approx(u)
-    assert "missing.h5" in rows["error"][1]
-    assert "missing.h5" in str(fleet[1])
-    assert "missing.h5" in fleet[1].to_dict()["error"]
-    assert fleet[0].to_dict()["conversion_constant"]["unit"] == "mV/Pa"
-    assert "Quality checks" in str(fleet[0])
-    with pytest.raises(memscal.MemscalError, match="could not be calibrated"):
-        fleet[1].ufloats()
 
 
 def test_parameters_are_rows_of_a_data_frame(calibration, loaded):

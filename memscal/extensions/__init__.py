@@ -51,7 +51,6 @@ VIEWS = {
     "MeasuredStress": ("summaries.stress", "figures.stress.measured_stress_figure"),
     "Restoration": ("summaries.restoration", "figures.stress.restoration_figure"),
     "Design": ("extensions.planning.summary", "extensions.planning.figure.design_figure"),
-    "FleetCalibration": ("extensions.fleet.calibration_summary", ""),
     "FleetResults": ("extensions.fleet.results_summary", "extensions.fleet.figure.fleet_figure"),
     "InterfaceComparison": (
         "extensions.interface_laws.summary",

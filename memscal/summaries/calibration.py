@@ -18,7 +18,7 @@ from memscal.model import records
 from memscal.model.apparatus import ApparatusData, ParameterSet, Reconvolution
 from memscal.model.arrays import Values
 from memscal.model.assumptions import MOVED
-from memscal.model.checks import EXPLANATIONS, REPEAT_CENTRES, Message
+from memscal.model.checks import EXPLANATIONS, REPEAT_CENTRES
 from memscal.model.quantities import (
     ESTIMATED,
     MM,
@@ -52,9 +52,7 @@ _FOUND = ("film_laws", "free", "explanations")
 def tables(result: Calibrated) -> list[Table]:
     """Return the estimates with their standard uncertainties, and the quality checks."""
     apparatus = apparatus_of(result)
-    rows = estimate_rows(
-        apparatus.parameters, apparatus.resolved_wavenumber, apparatus.process.messages
-    )
+    rows = _estimate_rows(apparatus)
     method = _method(apparatus)
     if method:
         rows.insert(-1, ("method", "", method))
@@ -229,11 +227,10 @@ def correlated(result: Calibrated) -> Values:
     return correlated_parameters(apparatus_of(result).parameters)
 
 
-def estimate_rows(
-    parameters: ParameterSet, resolved: float, messages: Sequence[Message]
-) -> list[tuple[str, str, str]]:
-    """Return words, symbol and value of each parameter and of the resolved wavenumber (rad/m)."""
-    repeats = any(message.kind == REPEAT_CENTRES for message in messages)
+def _estimate_rows(apparatus: ApparatusData) -> list[tuple[str, str, str]]:
+    """Return words, symbol and value of each parameter and of the resolved wavenumber."""
+    parameters = apparatus.parameters
+    repeats = any(message.kind == REPEAT_CENTRES for message in apparatus.process.messages)
     rows = []
     for name in parameters.names:
         start, number = name_and_scan(name)
@@ -244,7 +241,8 @@ def estimate_rows(
                 continue
             words = f"{ESTIMATED[start].words}, repeat {number}"
         rows.append((words, symbol, value))
-    return [*rows, ("resolved up to the wavenumber", "k", f"{resolved / PER_MM:.3g} rad/mm")]
+    resolved = f"{apparatus.resolved_wavenumber / PER_MM:.3g} rad/mm"
+    return [*rows, ("resolved up to the wavenumber", "k", resolved)]
 
 
 def _parameter_row(parameters: ParameterSet, name: str) -> tuple[str, str, str]:

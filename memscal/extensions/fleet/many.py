@@ -7,16 +7,14 @@ from functools import partial
 from os import PathLike
 from typing import Any, Literal, TypedDict, TypeVar, Unpack
 
+from memscal.apparatus import ApparatusFunction
 from memscal.calibration.calibrate import calibrate
 from memscal.calibration.prepare import References
 from memscal.calibration.uncertainty import Correlations
 from memscal.deconvolution.division import Method, MethodName, chosen_method
 from memscal.errors import InputError, MemscalError, require_names
 from memscal.formats.opened import Scans
-from memscal.model.apparatus import ApparatusRadial, ParameterSet
-from memscal.model.checks import Message, QualityCheck
 from memscal.model.film import FilmLaw
-from memscal.model.result import Correlated, Tabulated
 from memscal.model.scan import Scan
 from memscal.parallel import cores, shared
 from memscal.progress import Listener, Task, reporting
@@ -45,29 +43,16 @@ class CalibrationOptions(TypedDict, total=False):
     relative: bool
 
 
-@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class FleetCalibration(Tabulated, Correlated):
-    """The calibration of one scan of many, without its fields, or its error.
-
-    ``pandas.concat(result.to_dataframe() for result in results)`` is the table of all scans; of
-    some hundred thousand files ``memscal batch`` writes one.
+@dataclass(frozen=True)
+class FleetCalibration:
+    """The calibration of one scan of many, or its error.
 
     Parameters
     ----------
     index : int
         Its place among the scans.
-    parameters : ParameterSet or None
-        A and all other parameters with their covariance, in SI units.
-    radial_profile : ApparatusRadial or None
-        G with its standard uncertainty.
-    resolved_wavenumber : float or None
-        Up to which wavenumber the scan determines G, in rad/m.
-    budget : mapping
-        Standard uncertainties by source.
-    checks : tuple of QualityCheck
-        Quality checks.
-    messages : tuple of Message
-        Notes and warnings.
+    apparatus : ApparatusFunction or None
+        The result, compact: without G over the plane where that is round.
     error : MemscalError or None
         Why there is no result.
 
@@ -75,31 +60,25 @@ class FleetCalibration(Tabulated, Correlated):
     --------
     >>> import memscal
     >>> [result] = memscal.calibrate_many([memscal.simulate(seed=1)])
-    >>> result.passed, result.parameters.names[0]
+    >>> result.passed, result.apparatus.parameters.names[0]
     (True, 'conversion_constant')
     """
 
     index: int
-    parameters: ParameterSet | None = None
-    radial_profile: ApparatusRadial | None = None
-    resolved_wavenumber: float | None = None
-    budget: Mapping[str, Mapping[str, float]]
-    checks: tuple[QualityCheck, ...] = ()
-    messages: tuple[Message, ...] = ()
+    apparatus: ApparatusFunction | None
     error: MemscalError | None = None
 
     def __repr__(self) -> str:
         """Return A, or the error."""
-        if self.parameters is None:
+        if self.apparatus is None:
             problem = self.error.problem if self.error is not None else "no result"
             return f"<FleetCalibration {self.index}: {problem}>"
-        a = self.parameters.reading.constant(self.parameters["conversion_constant"])
-        return f"<FleetCalibration {self.index}: A = {a}>"
+        return f"<FleetCalibration {self.index}: {self.apparatus!r}>"
 
     @property
     def passed(self) -> bool:
         """Whether there is a result, and every quality check passed."""
-        return self.error is None and all(check.passed for check in self.checks)
+        return self.apparatus is not None and self.apparatus.passed
 
 
 def calibrate_many(
@@ -186,17 +165,7 @@ def attempted(name: str, work: Callable[[], _Result]) -> _Result | MemscalError:
 def _calibrated(item: tuple[int, Scans], options: CalibrationOptions) -> FleetCalibration:
     """Calibrate one scan; an error is part of its result."""
     index, scan = item
-    apparatus = attempted(
-        f"Scan {index}", lambda: calibrate(scan, other=False, **options).apparatus
-    )
-    if isinstance(apparatus, MemscalError):
-        return FleetCalibration(index=index, budget={}, error=apparatus)
-    return FleetCalibration(
-        index=index,
-        parameters=apparatus.parameters,
-        radial_profile=apparatus.radial_profile,
-        resolved_wavenumber=apparatus.resolved_wavenumber,
-        budget=apparatus.budget,
-        checks=apparatus.checks,
-        messages=apparatus.process.messages,
-    )
+    found = attempted(f"Scan {index}", lambda: calibrate(scan, other=False, **options))
+    if isinstance(found, MemscalError):
+        return FleetCalibration(index, None, found)
+    return FleetCalibration(index, found.apparatus.compact())

@@ -21,8 +21,8 @@ def scans(count):
 
 
 def constant(result):
-    assert result.parameters is not None, result.error
-    return result.parameters["conversion_constant"]
+    assert result.apparatus is not None, result.error
+    return result.apparatus.conversion_constant
 
 
 EXECUTORS = {
@@ -49,13 +49,15 @@ def test_every_scan_says_what_it_says_by_itself_and_a_bad_one_why(kind, tmp_path
     assert "Every voltage" in repr(found[1])
     for result, scan in zip(found[::2], good, strict=True):
         alone = memscal.calibrate(scan, method="bayesian").apparatus
+        own = result.apparatus
         assert constant(result) == pytest.approx(alone.conversion_constant, rel=1e-9)
         covariance = alone.parameters.covariance
         g = alone.radial_profile.g
-        np.testing.assert_allclose(result.parameters.covariance, covariance, rtol=1e-6, atol=1e-30)
-        np.testing.assert_allclose(result.radial_profile.g, g, rtol=1e-9, atol=1e-9 * g.max())
-        assert result.resolved_wavenumber == pytest.approx(alone.resolved_wavenumber, rel=1e-9)
-        assert [check.name for check in result.checks] == [check.name for check in alone.checks]
+        np.testing.assert_allclose(own.parameters.covariance, covariance, rtol=1e-6, atol=1e-30)
+        np.testing.assert_allclose(own.radial_profile.g, g, rtol=1e-9, atol=1e-9 * g.max())
+        assert own.resolved_wavenumber == pytest.approx(alone.resolved_wavenumber, rel=1e-9)
+        assert [check.name for check in own.checks] == [check.name for check in alone.checks]
+        assert own.plane is None
         assert result.passed == alone.passed
 
 
@@ -136,7 +138,7 @@ def test_files_and_joint_scans_are_calibrated(tmp_path):
 
 
 @pytest.mark.parametrize(("options", "words"), [
-    ({"executor": 2}, "executor is a int"), ({"film_law": "linear", "bogus": 1}, "bogus"),
+    ({"executor": 2}, "executor is of type int"), ({"film_law": "linear", "bogus": 1}, "bogus"),
     ({"method": "nonsense"}, "nonsense"), ({"method": "bayesian", "film_laws": "a"}, "film_laws"),
 ])  # fmt: skip
 def test_a_wrong_executor_method_or_option_is_refused_at_once(options, words):
