@@ -86,10 +86,11 @@ def calibration_messages(
             "convergence_unstated",
             "The reference states no convergence: its own error is not counted.",
         )
+    counted = results.budget["conversion_constant"]
     if form is None:
         yield from _law(solution, results)
-        yield from _unstated(solution)
-    yield from _assumed(assumptions, results.budget["conversion_constant"])
+        yield from _unstated(solution, counted)
+    yield from _assumed(assumptions, counted)
     if solution.scan.synthetic is not None:
         yield Message("synthetic", "The scan is synthetic: its truth is stored in it.")
 
@@ -227,11 +228,26 @@ def _law(solution: Solution, results: Results) -> Iterator[Message]:
     yield Message("film_law", text)
 
 
-def _unstated(solution: Solution) -> list[Message]:
+#: Sources of the budget that come from what is stated, or is not known of the film's law.
+_INPUTS = (
+    "young_modulus",
+    "thickness",
+    "poisson_ratio",
+    "rod_radius",
+    "load",
+    "model_form",
+    "gain",
+)
+
+
+def _unstated(solution: Solution, counted: Container[str]) -> list[Message]:
     """Return which inputs that no assumption is about state no uncertainty."""
     film = solution.scan.film
     if film is None:
         return []
+    if not any(source in counted for source in _INPUTS):
+        text = "No uncertainty of film, rod and load is stated: ± counts noise alone."
+        return [Message(quality.NOISE_ALONE, text)]
     uncertainties = {"rod radius": solution.scan.set_up.indenter.radius_uncertainty}
     # At a given load the stress in a linear film does not depend on its modulus.
     if film.law != LINEAR:

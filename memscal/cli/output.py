@@ -17,7 +17,7 @@ import click
 from memscal.errors import OutputError
 from memscal.figures import FIGURE_SUFFIXES
 from memscal.formats.files import HDF5_SUFFIXES, atomic_write_bytes, ensure_writable, together
-from memscal.model.checks import Message
+from memscal.model.checks import NOISE_ALONE, Message
 from memscal.summaries.table import WIDTH, Table, as_it_is, folded, readable, text_of
 
 if TYPE_CHECKING:
@@ -103,7 +103,8 @@ _PARTICULARS = re.compile(r"\([^)]*\)|[-+]?\d[\d.e+-]*")
 def show_messages(messages: Iterable[Message]) -> None:
     """Write the messages of a result to standard error, those that say the same once."""
     alike: dict[tuple[str, str, str], list[str]] = {}
-    for item in messages:
+    # What the answer says is not said again.
+    for item in (item for item in messages if item.kind != NOISE_ALONE):
         key = item.kind, item.severity, _PARTICULARS.sub("", item.text)
         alike.setdefault(key, []).append(item.text)
     for (_, severity, _), (text, *others) in alike.items():

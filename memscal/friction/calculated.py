@@ -27,6 +27,7 @@ def amontons_family(
     *,
     friction: Sequence[float] = FRICTIONS,
     loading: str = "incremental",
+    derivatives: bool = True,
     **options: Any,  # reach, cache, workers and order of FamilySetup; so in the next functions
 ) -> ProfileFamily:
     """Return the base stresses of a sphere on a film for a range of friction coefficients."""
@@ -34,7 +35,7 @@ def amontons_family(
     values = parameter_values("friction coefficients", friction)
     if loading not in ("incremental", "total"):
         raise InputError(f'loading is {loading!r}, but it is "incremental" or "total".')
-    paths = [setup.path(friction=mu, loading=loading) for mu in values]
+    paths = [setup.path(friction=mu, loading=loading, derivatives=derivatives) for mu in values]
     return setup.family(paths, name="amontons", loading=loading, values=values)
 
 

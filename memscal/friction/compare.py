@@ -2,13 +2,14 @@
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from os import PathLike
 
 import numpy as np
 
 from memscal.apparatus import ApparatusFunction, opened_apparatus
-from memscal.errors import InputError
+from memscal.errors import InputError, MemscalError
 from memscal.estimation.points import measured_mask
 from memscal.estimation.set_up import accepted_differences
 from memscal.extensions import hook
@@ -34,6 +35,7 @@ from memscal.friction.likelihood import (
     sensor_of,
 )
 from memscal.friction.results import FrictionComparison, LoadComparison
+from memscal.friction.wrong_inputs import wrong_inputs
 from memscal.measurement.measure_stress import joined_stress, measure_stress
 from memscal.measurement.posterior import common_inputs
 from memscal.measurement.restore import accept_other_sensor, load_of, single_loads
@@ -278,6 +280,12 @@ def compare(
         shear_families=shear_families,
         macroscopic=sliding,
     )
+    if comparison.unexplained and references is None and tangential is None:
+        first, *_ = channels_of(measured, sensor, families, (), between_scan_gain).values()
+        # At three times the loads a contact may have no solution.
+        with suppress(MemscalError):
+            factors = wrong_inputs(comparison, first, setting, beside)
+            comparison = replace(comparison, wrong_inputs=factors)
     laws = None
     if interface:
         laws = hook("compare_interface")(

@@ -266,6 +266,8 @@ class FrictionComparison(Shown, Tabulated, Correlated, Checked):
 
     ``joint``, of all loads together, is by normal stress and shear together where ``shear``, the
     apparatus function of a tangential channel, was given; all else is by the normal stress.
+    Where no coefficient explains all loads, ``wrong_inputs`` are inputs a factor on one of which
+    would: ``radius``, ``young_modulus``, ``thickness``, ``load``, ``gain``.
     Of a tangential channel alone ``loads`` is empty; ``by_shear`` holds the coefficient of each
     load by the loading in its place.  Printed, it is the tables of ``memscal compare``.
 
@@ -292,6 +294,7 @@ class FrictionComparison(Shown, Tabulated, Correlated, Checked):
     messages: tuple[Message, ...] = ()
     shear: ApparatusFunction | None = None
     by_shear: Mapping[str, tuple[BoundedEstimate, ...]] = field(default_factory=dict)
+    wrong_inputs: Mapping[str, float] | None = None
 
     def __repr__(self) -> str:
         """Return the main numbers in place of thousands of array elements."""

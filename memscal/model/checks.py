@@ -21,6 +21,7 @@ OUTLIER_WEIGHT = 0.5
 FAILED_CHECK = "failed_check"
 FAILED_CALIBRATION = "failed_calibration"
 NOISE_UNSTATED = "noise_unstated"
+NOISE_ALONE = "noise_alone"
 REPEAT_CENTRES = "repeat_centres"
 OVERRIDE = "override"
 

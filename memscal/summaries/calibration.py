@@ -18,7 +18,7 @@ from memscal.model import records
 from memscal.model.apparatus import ApparatusData, ParameterSet, Reconvolution
 from memscal.model.arrays import Values
 from memscal.model.assumptions import MOVED
-from memscal.model.checks import EXPLANATIONS, REPEAT_CENTRES
+from memscal.model.checks import EXPLANATIONS, NOISE_ALONE, REPEAT_CENTRES
 from memscal.model.quantities import (
     ESTIMATED,
     MM,
@@ -83,20 +83,22 @@ def answer(result: Calibrated) -> str:
     a = a.replace("(relative)", "(relative: the load is not known)")
     law = _dominating_law(apparatus)
     checks = verdict(apparatus.checks)
+    notes = apparatus.process.messages
+    alone = "".join(f" {note.text}" for note in notes if note.kind == NOISE_ALONE)
     failed = [check.kind for check in apparatus.checks if not check.passed]
     if failed and not misfit(apparatus.checks):
         cures = [EXPLANATIONS[kind][1] for kind in dict.fromkeys(failed) if kind in EXPLANATIONS]
-        return f"A = {a}{by} is in doubt. {checks}\nWhat to do: {'; '.join(cures)}.{law}"
+        return f"A = {a}{by} is in doubt.{alone} {checks}\nWhat to do: {'; '.join(cures)}.{law}"
     if not failed:
         sigma = measured_text(apparatus.parameters, "gaussian_sigma")
         suffices = f"Its Gaussian of σ = {sigma} suffices: the scan shows no departure."
-        return f"Use A = {a}{by}. {checks}\n{suffices}{law}"
+        return f"Use A = {a}{by}.{alone} {checks}\n{suffices}{law}"
     rows = _explanations(apparatus)
     rivals = [row for row in rows if row["named"] and row["name"] != DEPARTURE]
     settled = ": which A to use is not settled" if rivals else ""
-    found = f"A = {a}{by} if all is as stated{settled}. {checks}"
+    found = f"A = {a}{by} if all is as stated{settled}.{alone} {checks}"
     if not rivals and set(failed) <= set(OF_GAUSSIAN):
-        found = f"Use A = {a}{by}, with the profile G(r) and not its Gaussian. {checks}"
+        found = f"Use A = {a}{by}, with the profile G(r) and not its Gaussian.{alone} {checks}"
     return f"{found}\n{explanation(rows)}{law}"
 
 

@@ -66,6 +66,7 @@ def mapping(comparison: FrictionComparison) -> Values:
             sliding = {"friction": value, "friction_uncertainty": u}
             quantities = measured(records.FRICTION)
             whole["macroscopic"] = members(quantities, None, **sliding)[records.FRICTION.name]
+        whole["wrong_inputs"] = comparison.wrong_inputs
         whole["checks"] = checks_json(comparison.checks)
         whole["overridden"] = list(comparison.measured.overridden)
     whole["warnings"] = texts_of(comparison.messages)
@@ -268,6 +269,14 @@ def _which(lubrication: str, loading: str) -> str:
     return f"{words}, {loading} loading" if loading else words
 
 
+#: Inputs on which a factor is tried.
+_INPUTS = {
+    "radius": "radius",
+    "young_modulus": "Young's modulus",
+    "thickness": "thickness",
+    "load": "load",
+    "gain": "gain",
+}
 #: How the symbol of the coefficient is joined to its estimate, by the estimate's kind.
 _EQUALS = {VALUE: " =", INTERVAL: " in", UNKNOWN: " is", LOWER_BOUND: "", UPPER_BOUND: ""}
 
@@ -278,8 +287,8 @@ def answer(comparison: FrictionComparison) -> str:
     lines = []
     unexplained = comparison.unexplained
     if unexplained:
-        which = f"the {' and '.join(unexplained) or 'measured'} profiles"
-        lines.append(f"No friction coefficient explains {which}.")
+        loads = f"{' and '.join(unexplained)} profiles".strip()
+        lines.append(f"No friction coefficient explains the {loads}{_wrong(comparison)}")
     for lubrication, by_loading in comparison.joint.items():
         if lubrication in unexplained:
             continue
@@ -307,6 +316,17 @@ def answer(comparison: FrictionComparison) -> str:
         lines.append(f"{name}: μ{_EQUALS[estimates[0].kind]} {stated}{level}{taken}.")
     friction = "\n".join(lines)
     return f"{friction} {verdict(comparison.checks)}".strip()
+
+
+def _wrong(comparison: FrictionComparison) -> str:
+    """Say which wrong input would explain what no friction does."""
+    factors = comparison.wrong_inputs
+    if factors is None:
+        return "."
+    if not factors:
+        return f", nor does a factor on {' or '.join(_INPUTS.values())}."
+    named = [f"a {_INPUTS[name]} of {factor:.2f} times" for name, factor in factors.items()]
+    return f"; {', or '.join(named)} the stated one would explain them."
 
 
 _LABELS = ("", "state", "load (N)")

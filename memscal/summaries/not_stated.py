@@ -9,10 +9,13 @@ from memscal.model.scan import Scan
 
 def not_stated(scan: Scan) -> list[Values]:
     """Return what a scan does not state: its ``words``, ``option`` of import and ``cost``."""
+    text = Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")
     shape = getattr(scan.indenter, "shape", "rod")
     rows = []
-    for row in tomllib.loads(Path(__file__).with_suffix(".toml").read_text("utf-8"))["row"]:
+    for row in tomllib.loads(text)["row"]:
         owner = getattr(scan, row["of"]) if "of" in row else scan
-        if owner is not None and shape in row and getattr(owner, row["name"], None) in (None, ""):
+        value = getattr(owner, row["name"], "")
+        missing = value is None or (isinstance(value, str) and not value)
+        if owner is not None and shape in row and missing:
             rows.append({**row, "cost": row[shape]})
     return rows

@@ -70,6 +70,17 @@ def test_it_dominates_at_the_papers_load_and_hardly_counts_at_a_light_one(deep):
     assert u / without == pytest.approx(1.0, abs=0.1)
 
 
+def test_an_answer_says_once_where_its_uncertainty_counts_noise_alone(folder, run):
+    bare = memscal.ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3, law="neo-hookean")
+    scan = replace(simulated(load=0.05, seed=1), film=bare, load_uncertainty=None)
+    scan = replace(scan, indenter=replace(scan.indenter, radius_uncertainty=None))
+    words = "No uncertainty of film, rod and load is stated: ± counts noise alone."
+    for stated, alone in ((scan, True), (replace(scan, load_uncertainty=0.001), False)):
+        memscal.write_scan(stated, "scan.h5", overwrite=True)
+        told = run("calibrate", "scan.h5", "--force").exits(0)
+        assert " ".join((told.out + told.err).split()).count(words) == alone
+
+
 @pytest.mark.parametrize("law", ["", "neo-hookean", "linear"])
 def test_a_deep_rod_fails_only_under_a_film_that_is_stated_to_be_linear(deep, law):
     # No rubber slides that deep: where the linear film is stated, none is solved.

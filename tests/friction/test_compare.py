@@ -257,13 +257,52 @@ def test_an_error_of_the_film_that_sensor_and_contact_share_counts_once(made, ap
     assert not sensor_of(apparatus, family, 8e-3, [replace(made.dry, film=thick)]).shared
 
 
-def test_where_no_coefficient_explains_the_profiles_there_is_no_interval(made, apparatus, kept):
-    sphere = replace(made.dry.indenter, radius=2 * made.dry.indenter.radius)
-    wrong = [replace(scan, indenter=sphere) for scan in (made.dry, made.lubricated)]
+def stated(thing, **factors):
+    return replace(thing, **{name: by * getattr(thing, name) for name, by in factors.items()})
+
+
+def pressed_by(factor):
+    return lambda scan: {"load": factor * scan.load, "normal_load": factor * scan.normal_load}
+
+
+def read_with_gain(factor):
+    return lambda scan: {name: factor * getattr(scan, name) for name in ("u_zz", "u_zz_errors")}
+
+
+def by_night(changes, name, factor):
+    """One of the trials that take too long for every day."""
+    return pytest.param(changes, {name: factor}, marks=pytest.mark.full_study)
+
+
+@pytest.mark.parametrize(
+    ("changes", "named"),
+    [
+        (lambda scan: {"indenter": stated(scan.indenter, radius=2)}, {"radius": 0.5}),
+        by_night(
+            lambda scan: {"film": stated(scan.film, young_modulus=1.5)}, "young_modulus", 0.667
+        ),
+        by_night(lambda scan: {"film": stated(scan.film, thickness=1.3)}, "thickness", 0.769),
+        by_night(pressed_by(1.2), "load", 0.833),
+        by_night(read_with_gain(1.2), "gain", 1.2),
+        (lambda scan: {"u_zz": scan.u_zz * (1 + np.sin(scan.x / 1e-3))}, {}),
+    ],
+)
+def test_the_one_input_is_named_that_is_not_as_stated(made, apparatus, kept, changes, named):
+    wrong = [replace(scan, **changes(scan)) for scan in (made.dry, made.lubricated)]
     found = memscal.compare(
         wrong, apparatus, friction=FRICTION, loading="incremental", override=True, cache=kept
     )
     assert "joint_chi_square_dry" in failed(found)
+    factors = found.to_dict()["wrong_inputs"]
+    for name, factor in named.items():
+        assert factors[name] == pytest.approx(factor, rel=0.06)
+        words = name.replace("young_", "Young's ")
+        assert f"{words} of {factors[name]:.2f} times" in found.answer()
+    if "radius" in named:  # they are degenerate
+        assert factors["young_modulus"] == pytest.approx(1 / factors["radius"], rel=0.01)
+    if not named:
+        assert factors == {}
+        assert "nor does a factor on radius" in found.answer()
     assert found.answer().startswith("No friction coefficient explains the dry")
     for joint in found.to_dict()["joint"]:
         if joint["lubrication"] == "dry":
