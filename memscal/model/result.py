@@ -96,7 +96,8 @@ class Told:
     def to_dict(self) -> dict[str, Any]:
         """Return values with standard uncertainties and units, as JSON holds them.
 
-        The keys stand in the description of the result's class.
+        The keys are those that the command which makes such a result prints with ``--json``; its
+        JSON Schema, in ``memscal/cli/schemas``, describes each.
         """
         return dict(_shown_as("mapping", self))
 
