@@ -71,7 +71,9 @@ def test_it_dominates_at_the_papers_load_and_hardly_counts_at_a_light_one(deep):
 
 
 def test_an_answer_says_once_where_its_uncertainty_counts_noise_alone(folder, run):
-    bare = memscal.ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3, law="neo-hookean")
+    bare = memscal.ElasticFilm(
+        young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3, law="neo-hookean"
+    )
     scan = replace(simulated(load=0.05, seed=1), film=bare, load_uncertainty=None)
     scan = replace(scan, indenter=replace(scan.indenter, radius_uncertainty=None))
     words = "No uncertainty of film, rod and load is stated: ± counts noise alone."

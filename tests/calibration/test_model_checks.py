@@ -62,9 +62,11 @@ def test_the_bayes_factor_favours_a_gaussian_that_is_one():
 
 def test_a_constraint_that_the_scan_contradicts_is_found_and_one_that_it_meets_is_not():
     ring = simulated(noise=2e-4, repeats=4, kernel=RING)
-    assert not checks(ring, monotone=True)["constraint"].passed
+    assert not checks(ring, options={"monotone": True})["constraint"].passed
     passed = [
-        checks(simulated(noise=0.003, seed=seed, kernel=kernel), monotone=True)["constraint"].passed
+        checks(simulated(noise=0.003, seed=seed, kernel=kernel), options={"monotone": True})[
+            "constraint"
+        ].passed
         for kernel in (memscal.GaussianMixture(), TAILS)
         for seed in range(5)
     ]

@@ -200,7 +200,7 @@ def test_what_is_no_field_is_refused(name):
         ("gaussian", "no length"),
         ("slit:0mm", "above zero"),
         ("disc:0,5mm", "decimal point"),
-        (["disc:1mm", None], "2 references"),
+        (["disc:1mm", None], "differ in number: 2 and 1"),
         (field(), "not round"),
     ],
 )

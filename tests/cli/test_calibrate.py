@@ -36,10 +36,11 @@ def lawless(folder):
 
 def test_a_reference_of_another_film_is_refused_or_its_override_recorded(run, lawless):
     run("reference", "rod", "--thickness", "2.1", "-o", "thick.h5")
-    both = "2 mm (u 0.02) in the scan scan.h5, 2.1 mm (u not stated) in the reference thick.h5"
+    both = "film thickness  2 mm (u 0.02)     2.1 mm (u not stated)"
     for further in ([], ["--dry-run"]):
         refused = run("calibrate", lawless, "--reference", "thick.h5", *further)
-        refused.exits(3, "--override", both)
+        refused.exits(3, "--override", "the scan scan.h5  the reference thick.h5")
+        assert both in refused.err
     done = run("calibrate", lawless, "--reference", "thick.h5", "--override")
     assert "Overridden: film thickness 2 mm" in done.err
     process = memscal.load_apparatus("scan.apparatus.h5").process

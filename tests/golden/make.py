@@ -200,7 +200,7 @@ SCALES = {"p_value": 1.0, "chi2": 1.0, "convergence": 1.0}
 
 STATISTICS = {
     "standard_uncertainty", "relative_uncertainty", "budget", "checks", "draws", "reconvolution",
-    "p_value", "chi2",
+    "p_value", "chi2", "size_for_one_u", "size_for_one_u_of_fwhm",
 }  # fmt: skip
 """Keys of what says how well a number is known, and need not be known better than that."""
 
@@ -229,7 +229,7 @@ def differences(
         stated = golden.get("standard_uncertainty") or 0.0
         for key in golden.keys() & result.keys():
             own = max(tolerance, share) if key in STATISTICS else tolerance
-            size = SCALES.get(key, scale)
+            size = SCALES.get(key, SCALES.get(str(golden.get("name")), scale))
             own_uncertainty = stated if key == "value" else 0.0
             items = golden[key], result[key]
             yield from differences(*items, own, share, f"{path}.{key}", size, own_uncertainty)

@@ -190,7 +190,7 @@ BARE = replace(EXACT.radial_profile, g_covariance=np.full((301, 301), np.nan))
 BESIDE = replace(SCAN, x=SCAN.x[18:], u_zz=SCAN.u_zz[18:], u_zz_errors=None)
 BAD = {
     "several loads": (replace(SCAN, normal_load=np.linspace(0.5, 1.5, 33)), EXACT, "grows"),
-    "another sensor": (replace(SCAN, sensor=OTHER), EXACT, 'name of the sensor "other" in'),
+    "another sensor": (replace(SCAN, sensor=OTHER), EXACT, 'name of the sensor  "other"'),
     "no covariance": (SCAN, replace(EXACT, radial_profile=BARE), "does not state the covariance"),
     "zero noise": (replace(SCAN, u_zz_errors=np.zeros(33)), EXACT, "uncertainty of zero"),
     "wrong sign": (replace(SCAN, u_zz=-SCAN.u_zz), EXACT, "Change the sign"),

@@ -47,7 +47,7 @@ def test_scans_come_in_their_order_from_a_cluster_of_which_a_worker_is_killed(wo
         rest = list(results)
     assert [result.index for result in (first, *rest)] == list(range(SCANS))
     last = memscal.calibrate(paths[-1], method="bayesian").apparatus
-    assert rest[-1].parameters["conversion_constant"] == pytest.approx(last.conversion_constant)
+    assert rest[-1].apparatus.conversion_constant == pytest.approx(last.conversion_constant)
 
 
 def test_a_batch_outlives_a_worker_that_is_killed(workers, scans, tmp_path, capsys):
