@@ -300,8 +300,7 @@ def _read_profile(file: SafeFile, path: str, scan: MeasuredScan) -> MeasuredProf
     n = arrays["r"].size
     name = path.rpartition("/")[2]
     roots = _read_roots(file, name, path, n)
-    budget_path = _part_of_profile(file, "budgets", name, f"{path}/budget")
-    budget = groups.read_budget(file, budget_path)
+    budget = groups.read_budget(file, _part_of_profile(file, "budgets", name, f"{path}/budget"))
     if not roots or not budget.keys() >= _BUDGET.keys():
         raise FormatError(
             f"{file.where(path)} states no covariance of its stress, or no budget.",

@@ -322,8 +322,7 @@ class FiniteStrainField:
     def base(self, r: FloatArray, order: int) -> FloatArray:
         """Return normal stress or outward traction at the base in Pa."""
         nodes = self.tractions[0]
-        spline = radial_spline(nodes, self.tractions[1 + order], order=order)
-        return up_to(nodes[-1], spline, r)
+        return up_to(nodes[-1], radial_spline(nodes, self.tractions[1 + order], order=order), r)
 
     def spectrum(self, k: FloatArray, order: int) -> FloatArray:
         """Return the transform of normal stress or traction at ``k`` (rad/m), in N."""

@@ -350,8 +350,7 @@ def implied_friction(
 def _maxima(channel: Channel, values: FloatArray) -> FloatArray:
     """Return stresses on the axis behind G, times A, shape (V, L)."""
     sensor = channel.sensor
-    spectra = channel.family.at(values).spectra
-    return spectra @ (sensor.transfer * sensor.wavenumbers.weights)
+    return channel.family.at(values).spectra @ (sensor.transfer * sensor.wavenumbers.weights)
 
 
 def _read(values: FloatArray, curve: FloatArray, top: float) -> float:

@@ -73,9 +73,7 @@ def require_numbers(samples: Samples) -> None:
             )
 
 
-def profile_of(
-    samples: Samples, stated: Mapping[str, Any], value: float | None = None
-) -> ImportedProfile:
+def profile_of(samples: Samples, stated: Mapping[str, Any], value: float | None) -> ImportedProfile:
     """Check samples of a stress, sort them by radius, and hold their force against the load."""
     # Without a load it is their force, to which they are scaled where a value in N is given.
     name = samples.source.file_name
