@@ -179,8 +179,7 @@ def _draw_maps(figure: Figure, place: SubplotSpec, data: ApparatusData, loads: L
         _finish(left, _draw_points(left, scan, voltage, "viridis", span), voltage_label)
         left.set_ylabel("$y$ from the centre (mm)", labelpad=8)
         right = figure.add_subplot(grid[row, 1], label="residual map")
-        drawn = _draw_points(right, scan, z, "RdBu_r", _RESIDUALS)
-        _finish(right, drawn, f"residual / {scale}")
+        _finish(right, _draw_points(right, scan, z, "RdBu_r", _RESIDUALS), f"residual / {scale}")
         for axes in (left, right):
             axes.set_title(load, loc="left", fontsize=8.0, pad=4)
         panels += [left, right]

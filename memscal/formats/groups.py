@@ -55,8 +55,7 @@ def write_source(source: SourceFile) -> Group:
 
 def read_source(file: SafeFile, path: str) -> SourceFile:
     """Read the name and the checksum of a file that was read."""
-    name = file.text(f"{path}/file_name")
-    return SourceFile(name, file.text(f"{path}/checksum"))
+    return SourceFile(file.text(f"{path}/file_name"), file.text(f"{path}/checksum"))
 
 
 KINDS = {

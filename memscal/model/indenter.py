@@ -176,10 +176,8 @@ class Profile(Indenter):
     z: FloatArray
 
     def __post_init__(self) -> None:
-        r = finite_vector("r of the indenter's profile", self.r)
-        z = finite_vector("height of the indenter's profile", self.z)
-        object.__setattr__(self, "r", r)
-        object.__setattr__(self, "z", z)
+        object.__setattr__(self, "r", finite_vector("r of the indenter's profile", self.r))
+        object.__setattr__(self, "z", finite_vector("height of the indenter's profile", self.z))
         require_increasing("r of the indenter's profile", self.r)
         if self.r.size != self.z.size or self.r.size < 4 or self.r[0] != 0:
             raise InputError(

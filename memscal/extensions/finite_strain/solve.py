@@ -326,8 +326,7 @@ class FiniteStrainField:
 
     def spectrum(self, k: FloatArray, order: int) -> FloatArray:
         """Return the transform of normal stress or traction at ``k`` (rad/m), in N."""
-        r = self.tractions[0]
-        return hankel_transform(r, self.tractions[1 + order], k, order=order)
+        return hankel_transform(self.tractions[0], self.tractions[1 + order], k, order=order)
 
     def surface(self, r: FloatArray, order: int) -> FloatArray:
         """Return depression or outward displacement in m at radii before the deformation."""

@@ -188,8 +188,7 @@ def _described(mesh: Any, arrays: list[Any]) -> dict[str, Any]:
     for i, block in enumerate(mesh.cells):
         data = fields({name: blocks[i] for name, blocks in mesh.cell_data.items()})
         cells.append({"dimension": int(block.dim), "nodes": add(block.data), "data": data})
-    points = add(mesh.points)
-    return {"points": points, "point_data": fields(mesh.point_data), "cells": cells}
+    return {"points": add(mesh.points), "point_data": fields(mesh.point_data), "cells": cells}
 
 
 if __name__ == "__main__":

@@ -130,8 +130,7 @@ class DrawnScans:
                 voltages = voltages - standard[source] * (effect.voltage + effect.scaling * signal)
         if solved:
             model = replace(estimate.model, references=self._reference_changes(standard))
-            geometry = model.geometry(estimate.centres)
-            voltages = voltages + model.signal(geometry, estimate.kernel)
+            voltages = voltages + model.signal(model.geometry(estimate.centres), estimate.kernel)
         return voltages
 
     @cached_property

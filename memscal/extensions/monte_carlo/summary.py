@@ -55,8 +55,12 @@ def _comparison_json(comparison: BudgetComparison, result: MonteCarlo) -> Values
     for name, number in vars(comparison).items():
         if name not in ("name", "reason"):
             values[_KEYS.get(name, name)] = plain(number, quantity.scale)
-    decided = {"agrees": comparison.agrees, "reason": comparison.reason}
-    return {**values, "unit": quantity.unit_text, **decided}
+    return {
+        **values,
+        "unit": quantity.unit_text,
+        "agrees": comparison.agrees,
+        "reason": comparison.reason,
+    }
 
 
 def frame(result: MonteCarlo) -> DataFrame:

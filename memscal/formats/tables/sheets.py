@@ -234,9 +234,8 @@ class FrameTable(NamedColumns):
 
     def _describe(self, count: int) -> None:
         sha256 = f" (sha256 {self.source.sha256})" if self.source else ""
-        origin = f"Imported from {self._name}{sha256}."
         self.notes = (
-            origin,
+            f"Imported from {self._name}{sha256}.",
             f"Read {counted(count, 'rows')} of {counted(len(self.names), 'columns')}.",
         )
 
