@@ -196,7 +196,7 @@ class Pressing:
         place, gap = self.nearest(state)
         touches = np.isin(nodes, state.touching)
         place[touches] = state.place
-        chosen = np.where(touches, True, gap < -_INSIDE * self.elements.thickness)
+        chosen = touches | (gap < -_INSIDE * self.elements.thickness)
         if forces is not None:  # else none leaves
             _, (along, up), _ = self.face.contour(place)
             pushed = up * forces[nodes] - along * forces[nodes + self.elements.n] > 0
