@@ -101,12 +101,13 @@ def command(
     from memscal.progress import span
 
     chosen = calibration_settings(**settings)
-    results = Path(os.path.realpath(results))
+    # Workers see the same files from folders of their own.
+    folder = Path(os.path.realpath(results))
     paths = [Path(os.path.realpath(path)) for path in expanded(sources)]
     words, reading = recipe_of(recipe) if recipe else ({}, None)
     words |= settings | {"artifacts": artifacts}
-    batch = Batch(paths, results, chosen, artifacts, words, reading, force, shard_size)
-    if report is not None and results not in Path(os.path.realpath(report)).parents:
+    batch = Batch(paths, folder, chosen, artifacts, words, reading, force, shard_size)
+    if report is not None and folder not in Path(os.path.realpath(report)).parents:
         scans = batch.scans() if report.exists() else ()
         inputs = [*paths, *(batch.folder / scan.path for scan in scans)]
         out.prove_writable([report], force=force, inputs=inputs)
