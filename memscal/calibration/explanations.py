@@ -40,10 +40,10 @@ from memscal.model.quantities import MM
 from memscal.model.scan import Scan
 
 _EVIDENCE = "gaussian_evidence"
-OF_GAUSSIAN = ("gaussian_misfit", _EVIDENCE)
+_OF_GAUSSIAN = ("gaussian_misfit", _EVIDENCE)
 #: Checks whose failure is explained.
 MISFITS = (
-    *OF_GAUSSIAN,
+    *_OF_GAUSSIAN,
     "width_agreement",
     "method_agreement",
     "reconvolution",
@@ -90,7 +90,7 @@ def explained(
     found = f" {explanation(rows)}"
     told = []
     for check in checks:
-        failed = check.name in OF_GAUSSIAN and not check.passed
+        failed = check.name in _OF_GAUSSIAN and not check.passed
         told.append(replace(check, meaning=check.meaning + found * failed))
     return tuple(told), rows
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from memscal.calibration.calibrate import Calibration
-from memscal.calibration.explanations import DEPARTURE, OF_GAUSSIAN, explanation, misfit
+from memscal.calibration.explanations import DEPARTURE, explanation, misfit
 from memscal.calibration.stages import Misfit
 from memscal.estimation.points import MINIMUM_POSITIONS, ScanPoints, loads_differ
 from memscal.mechanics.contact import Contact
@@ -97,8 +97,6 @@ def answer(result: Calibrated) -> str:
     rivals = [row for row in rows if row["named"] and row["name"] != DEPARTURE]
     settled = ": which A to use is not settled" if rivals else ""
     found = f"A = {a}{by} if all is as stated{settled}.{alone} {checks}"
-    if not rivals and set(failed) <= set(OF_GAUSSIAN):
-        found = f"Use A = {a}{by}, with the profile G(r) and not its Gaussian.{alone} {checks}"
     return f"{found}\n{explanation(rows)}{law}"
 
 

@@ -5,7 +5,6 @@ import subprocess
 from dataclasses import replace
 
 import pytest
-from dcclib.validation import SchematronValidator, XsdValidator
 from helpers.folders import SHIPPED
 
 import memscal
@@ -59,6 +58,8 @@ def documents(certificates):
 
 
 def test_ptb_s_schematron_finds_no_error(documents):
+    from dcclib.validation import SchematronValidator
+
     judge = SchematronValidator.for_dcc()
     for made in documents:
         said = judge.validate_str(made.decode())
@@ -72,6 +73,8 @@ def test_ptb_s_schematron_finds_no_error(documents):
 
 @pytest.mark.skipif(not SCHEMA, reason=NO_SCHEMA)
 def test_it_is_valid_by_the_schema(documents):
+    from dcclib.validation import XsdValidator
+
     judge = XsdValidator.from_file(SCHEMA)
     for made in documents:
         assert [error.message for error in judge.validate_str(made.decode()).errors] == []
