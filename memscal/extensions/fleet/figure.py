@@ -30,7 +30,7 @@ _MANY = 2000
 
 def fleet_figure(fleet: FleetResults) -> Figure:
     """Draw the distributions of A and sigma, and both over wafer or batch, from their medians."""
-    with panels_of(5.6, 2, 2, note="") as (figure, panels):
+    with panels_of(6.6, 2, 2, note="") as (figure, panels):
         for (symbol, name), (upper, lower) in zip(SUMMARISED.items(), panels.T, strict=True):
             values = getattr(fleet, name)
             middle = median(values)
