@@ -22,6 +22,8 @@ from memscal.model.arrays import FloatArray, Values
 
 _MOST_BINS = 60
 _MOST_NAMES = 12
+#: Characters of a name beside its place.
+_LONGEST_NAME = 16
 #: What a histogram shows, in robust standard deviations from the median.
 _REACH = 8.0
 #: Markers that are drawn as an image, which keeps a page of many sensors small.
@@ -30,7 +32,7 @@ _MANY = 2000
 
 def fleet_figure(fleet: FleetResults) -> Figure:
     """Draw the distributions of A and sigma, and both over wafer or batch, from their medians."""
-    with panels_of(6.6, 2, 2, note="") as (figure, panels):
+    with panels_of(5.6, 2, 2, note="") as (figure, panels):
         for (symbol, name), (upper, lower) in zip(SUMMARISED.items(), panels.T, strict=True):
             values = getattr(fleet, name)
             middle = median(values)
@@ -86,7 +88,7 @@ def _places(axes: Axes, fleet: FleetResults, change: FloatArray, label: str) -> 
     axes.figure.colorbar(points, ax=axes, label=label, extend="both")
     placed = np.isfinite(x + y)
     for i in [i for i in outliers(fleet) if placed[i]][:_MOST_NAMES]:
-        name = drawable(fleet.sensors[i])
+        name = drawable(fleet.sensors[i][:_LONGEST_NAME])
         axes.annotate(name, (x[i], y[i]), (3, 3), textcoords="offset points", fontsize=6)
     checks = fleet.failed.keys() - fleet.errors.keys()
     marks = (("not calibrated", fleet.errors, MUTED), ("check failed", checks, MEASURED))
