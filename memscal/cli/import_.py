@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -30,6 +32,7 @@ from memscal.cli.options import (
     rod_friction_option,
     with_laboratory,
 )
+from memscal.errors import MemscalError
 from memscal.extensions import hook
 from memscal.formats.files import together
 from memscal.model.checks import import_notes, marked_texts
@@ -111,6 +114,8 @@ _OF_BOTH = (
 )
 _NEEDED = {"scan": ("x", "u"), "reference": ("sigma",)}
 _NEEDED_WITH_MESH = ("r_unit", "sigma_unit")
+#: Columns that a message names.
+_NAMED = 12
 
 
 @click.command("import", epilog=EXAMPLES)
@@ -417,8 +422,7 @@ def _check_usage(path: Path, kind: str, mesh: bool, options: Options) -> None:
     missing = [name for name in needed if options[name] is None]
     if missing:
         raise click.UsageError(
-            f"A {kind} needs more: add {named(missing)}. See the examples of "
-            "`memscal import --help`."
+            f"A {kind} needs more: add {named(missing)}. {_example(path, missing, options)}"
         )
     other = "reference" if kind == "scan" else "scan"
     others: Iterable[str] = _OF_REFERENCE
@@ -440,6 +444,26 @@ def _check_usage(path: Path, kind: str, mesh: bool, options: Options) -> None:
     if unused and kind == "reference":
         problem = f"A {'mesh' if mesh else 'table'} has no use for {named(unused)}."
         raise click.UsageError(problem)
+
+
+def _example(table: Path, missing: Sequence[str], options: Options) -> str:
+    """Return a command for the user's own table, with its first columns as x and u."""
+    from memscal.formats.tables.sheets import open_table
+
+    columns: Sequence[str] = ()
+    if {*missing} <= {"x", "u"}:
+        with suppress(MemscalError):
+            columns = open_table(table, **_stated(options, _READING)).names
+    free = [column for column in columns if column not in options.values()]
+    if len(free) < len(missing):
+        return "See the examples of `memscal import --help`."
+    line = ["memscal", "import", str(table)]
+    for name in ("x", "u"):
+        line += [f"--{name}", options[name] or free.pop(0)]
+    return (
+        f"The columns of {table.name} are {', '.join(columns[:_NAMED])}. For instance: "
+        f"{shlex.join([*line, '-o', f'{table.stem}.h5'])}"
+    )
 
 
 def _stated(values: dict[str, Any], names: Iterable[str]) -> dict[str, Any]:

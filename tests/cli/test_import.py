@@ -57,3 +57,15 @@ def test_an_import_ends_with_what_is_not_stated(run):
     assert "--film-law" not in told
     assert "--gain-uncertainty" not in told
     assert "--load-uncertainty" in told
+
+
+def test_a_refusal_shows_the_command_for_the_own_table(run, folder):
+    (folder / "my log.csv").write_text("Weg,Signal,Kraft\n" + "0.5,1.5,1\n" * 9, encoding="utf-8")
+    shown = "memscal import 'my log.csv' --x Weg --u Signal -o"
+    run("import", "my log.csv", "-o", "scan.h5").exits(2, shown)
+    run("import", "my log.csv", "-o", "scan.h5", "--u", "Kraft").exits(2, "--x Weg --u Kraft -o")
+    asked = ("import", "my log.csv", "-o", "scan.h5", "--x", "Weg", "--u", "Signal")
+    run(*asked).exits(3, "as in 'Signal/mV'")
+    run(*asked, "--u-unit", "mV").exits(3, "as in 'Weg/mm'")
+    refusal = run("batch", "my log.csv", "-o", "results").exits(3, "recipe").err
+    assert str(folder) not in refusal

@@ -28,6 +28,7 @@ from memscal.extensions.fleet.shards import (
     manifest_scans,
     read_batch,
     read_shard,
+    relative,
     shard_paths,
     write_batch,
     write_shard,
@@ -162,7 +163,10 @@ class Batch:
                 why=stays,
                 cure="Resume with the manifest and the --shard-size that it was begun with.",
             )
-        return replace(self, shard_size=size, count=count)
+        # Workers see the same files from folders of their own.
+        sources = [Path(os.path.realpath(path)) for path in self.sources]
+        results = Path(os.path.realpath(results))
+        return replace(self, sources=sources, results=results, shard_size=size, count=count)
 
     def _require_same(self, before: Mapping[str, str]) -> None:
         """Refuse to go on with other options than before, and name each."""
@@ -200,8 +204,9 @@ class Batch:
             raise InputError(
                 f"None of the {count} scans that {source.name} lists is there; the first is "
                 f"{first[:200]!r}.",
-                why=f"Paths are relative to {self.folder}.",
-                cure="List a path a line, or give a table with a column path, separated by commas.",
+                why="Paths are relative to the folder of the list.",
+                cure="List a path a line, or give a table with a column path, separated by commas. "
+                "If it is a table of readings, give a recipe (--recipe).",
             )
         return count
 
@@ -296,7 +301,7 @@ def _row(batch: Batch, shard: Shard, i: int) -> Values:
     row = {
         "place": shard.first + i,
         **asdict(item),
-        "path": _relative(path, batch.results),
+        "path": relative(path, batch.results),
         "passed": False,
         "calibrated_at": timestamp(),
         "input_sha256": _sha256_of_file(path),
@@ -325,10 +330,3 @@ def _calibrated(batch: Batch, path: Path, row: Values) -> ApparatusFunction:
     if batch.recipe and batch.recipe["name_pattern"] and row["wafer_x"] is None:
         row |= place_in_name(path, batch.recipe)
     return calibrate(scan, other=False, **batch.options).apparatus
-
-
-def _relative(path: Path, folder: Path) -> str:
-    """Return a path as seen from a folder; on another disk as it is."""
-    with suppress(ValueError):
-        return Path(os.path.relpath(path, folder)).as_posix()
-    return str(path)

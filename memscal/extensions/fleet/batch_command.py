@@ -101,13 +101,12 @@ def command(
     from memscal.progress import span
 
     chosen = calibration_settings(**settings)
-    # Workers see the same files from folders of their own.
-    folder = Path(os.path.realpath(results))
-    paths = [Path(os.path.realpath(path)) for path in expanded(sources)]
+    paths = expanded(sources)
     words, reading = recipe_of(recipe) if recipe else ({}, None)
     words |= settings | {"artifacts": artifacts}
-    batch = Batch(paths, folder, chosen, artifacts, words, reading, force, shard_size)
-    if report is not None and folder not in Path(os.path.realpath(report)).parents:
+    batch = Batch(paths, results, chosen, artifacts, words, reading, force, shard_size)
+    within = Path(os.path.realpath(results))
+    if report is not None and within not in Path(os.path.realpath(report)).parents:
         scans = batch.scans() if report.exists() else ()
         inputs = [*paths, *(batch.folder / scan.path for scan in scans)]
         out.prove_writable([report], force=force, inputs=inputs)
@@ -147,7 +146,7 @@ def command(
         out.say_written([report])
     if not errors + failed:
         return DONE
-    what = f"{errors} of {total} scans were not calibrated, {failed} failed a quality check"
+    what = f"{errors} of {total} scans could not be calibrated, {failed} failed a quality check"
     out.warn(f"{what}: memscal summary {results}")
     return CHECK_FAILED
 

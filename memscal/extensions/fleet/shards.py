@@ -54,13 +54,20 @@ def expanded(sources: Iterable[Path]) -> list[Path]:
     return [Path(path) for path in paths]
 
 
+def relative(path: Path, folder: Path) -> str:
+    """Return a path as seen from a folder; on another disk as it is."""
+    with suppress(ValueError):
+        return Path(os.path.relpath(path, folder)).as_posix()
+    return str(path)
+
+
 def manifest_scans(
     sources: Sequence[Path], suffixes: tuple[str, ...] = HDF5_SUFFIXES
 ) -> Iterator[FleetScan]:
     """Yield several scans, those of a folder, by their names, or of a manifest, in its order."""
     source = sources[0]
     if len(sources) > 1:
-        yield from (FleetScan(path.as_posix()) for path in sources)
+        yield from (FleetScan(relative(path, source.parent)) for path in sources)
         return
     if source.is_dir():
         yield from _folder_scans(source, suffixes)
@@ -330,7 +337,7 @@ def _messages(table: Any, words: Mapping[str, Any], scans: int) -> Iterator[Mess
     if repeated:
         more = len(repeated) - _NAMED
         tail = f" and {more} more" if more > 0 else ""
-        text = f"{len(repeated)} scans have the content of another one and count again"
+        text = f"{len(repeated)} of the scans repeat the content of another one and count again"
         yield Message("repeated", f"{text}: {', '.join(repeated[:_NAMED])}{tail}.", "warning")
     overridden: dict[str, str] = {}
     for path, messages in zip(paths, table["messages"], strict=True):

@@ -42,6 +42,8 @@ _CAUSES = (
     ),
     (UNIT.fullmatch, "Units change from row to row; one is read for the whole column."),
 )
+#: Units of an example, of columns that are no lengths.
+_UNITS = {"u": "mV", "load": "N", "time": "s", "sigma": "Pa"}
 #: Room beyond the rows that were counted.
 _SPARE = 250
 
@@ -149,8 +151,9 @@ class NamedColumns:
             )
         chosen = unit or stated or default
         if not chosen:
-            cure = f"Give it in the head of the column, as in 'x/mm', or as {option}. Where it is "
-            cure += "not known: 1 of readings; of positions any, and calibrate with a source "
+            example = f"{column}/{_UNITS.get(option.partition('_')[0], 'mm')}"
+            cure = f"Give it in the head of the column, as in {example!r}, or as {option}. Where "
+            cure += "it is not known: 1 of readings; of positions any, and calibrate with a source "
             cure += "(--reference point), so that all lengths are in it."
             raise InputError(f"{self.where(column)} states no unit that is known.", cure=cure)
         return chosen.strip()

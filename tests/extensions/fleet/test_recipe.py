@@ -108,7 +108,7 @@ def test_a_batch_of_tables_is_that_of_their_scans(run, tables):
     dry = run(*line, "--dry-run", "--json").exits(1).json
     assert (dry["scans"], dry["shards"], dry["refused"]) == (3, 1, 1)
     assert not Path("results").exists()
-    run(*line).exits(1, "1 of 3 scans were not calibrated")
+    run(*line).exits(1, "1 of 3 scans could not be calibrated")
     rows, expected = (pd.read_parquet(f"{name}/shards") for name in ("results", "of_scans"))
     assert list(rows["path"]) == [
         "../dies/die_0_7.csv",
