@@ -17,7 +17,7 @@ from memscal.model.indenter import Rod
 from memscal.model.provenance import SourceFile
 from memscal.model.quantities import Record
 from memscal.model.records import FILM, INDENTER, LOAD
-from memscal.model.scan import Scan
+from memscal.model.scan import Scan, require_pressed
 from memscal.readings.mistaken_unit import require_plausible
 
 #: Stated values agree within this many standard uncertainties of their difference ...
@@ -117,6 +117,7 @@ def require_calibration_rod(scan: Scan, reference: BaseStress | None) -> None:
             "linear in load.",
             cure="Calibrate with a rod scan, then apply the apparatus function to this scan.",
         )
+    require_pressed(scan.motion, scan.source)
     if with_film_of(reference, scan).film is not None:
         require_plausible(scan)
 

@@ -77,6 +77,7 @@ def _read_scans(
                 indenter=groups.read_round_indenter(file, f"{path}/indenter"),
                 **groups.read_instrument(file, path),
                 lubrication=lubrication,
+                motion=file.optional_text(f"{path}/indenter/motion"),
                 source=source,
                 **numbers,
             )
@@ -177,7 +178,7 @@ def _entry(measured: MeasuredStress) -> Group:
     for i, scan in enumerate(measured.scans, 1):
         parts: Nodes = {
             "sample": groups.sample_group(scan),
-            "indenter": groups.indenter_group(scan.indenter),
+            "indenter": groups.indenter_group(scan.indenter, scan),
             "instrument": groups.instrument_group(scan),
             **write_record(records.MEASURED_SCAN, scan).children,
         }

@@ -45,7 +45,7 @@ from memscal.model.checks import Message, override_messages
 from memscal.model.indenter import Sphere
 from memscal.model.measured_stress import MeasuredScan, MeasuredStress
 from memscal.model.provenance import accepted_alterations
-from memscal.model.scan import Scan
+from memscal.model.scan import Scan, require_pressed
 from memscal.model.sizes import MOST_COMPARED, MOST_COMPARED_TOGETHER, too_large
 from memscal.model.stress import StressProfile
 from memscal.parallel import single_threaded
@@ -74,6 +74,7 @@ def require_contacts(scans: Sequence[Scan | MeasuredScan]) -> None:
                 "grow: a rod scan calibrates a sensor.",
                 cure="Give the scans of a sphere's contacts; calibrate with the rod scan.",
             )
+        require_pressed(scan.motion, scan.source)
         if isinstance(scan, Scan) and scan.y is not None:
             require_line(place, scan.x, scan.y)
         if (scan.film, scan.indenter) != (scans[0].film, scans[0].indenter):

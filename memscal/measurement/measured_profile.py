@@ -319,6 +319,7 @@ def measured_scan(scan: Scan) -> MeasuredScan:
         stage=scan.stage,
         width=_width(scan),
         lubrication=scan.lubrication,
+        motion=scan.motion,
         position_scale_uncertainty=scan.position_scale_uncertainty,
         gain_uncertainty=scan.gain_uncertainty,
         position_errors_by_repeat=scan.position_errors_by_repeat,

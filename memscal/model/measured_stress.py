@@ -68,6 +68,7 @@ class MeasuredScan:
     load_cell: LoadCell = field(default_factory=LoadCell)
     stage: Equipment = field(default_factory=Equipment)
     lubrication: str = ""
+    motion: str = ""
     position_scale_uncertainty: float | None = None
     gain_uncertainty: float | None = None
     position_errors_by_repeat: bool = False

@@ -50,6 +50,7 @@ LOAD = record(
     "NXcollection",
     *_LOAD,
     Quantity("rod_friction", _ONE, "friction of the rod", stored="friction_coefficient"),
+    Quantity("motion", "text", "motion of the indenter"),
 )
 INDENTER = record(
     "NXcollection",

@@ -40,6 +40,9 @@ LIKE_SIGNAL = ("u_zz_errors", "normal_load", "normal_load_errors", "time")
 LUBRICATIONS = ("", "dry", "lubricated")
 """States of lubrication; empty where a scan states none."""
 
+MOTIONS = ("", "pressed", "sliding")
+"""How an indenter moved; one that states nothing was pressed at each place."""
+
 STATED_ERRORS = (
     "position_scale",
     "gain",
@@ -66,6 +69,19 @@ def require_rod_friction(friction: float | None) -> None:
             f"The rod's friction is {friction:g}.",
             why="Only a rod that slides freely or sticks is solved at finite strain.",
             cure="Give 0 or inf, or leave it out: the difference is then counted.",
+        )
+
+
+def require_pressed(motion: str, source: SourceFile | None) -> None:
+    """Refuse the scan of an indenter that slid."""
+    if motion == "sliding":
+        raise InputError(
+            f"{source.file_name if source else 'The scan'} was made with a sliding indenter "
+            "(/entry/indenter/motion).",
+            why="The calculated contacts are those of an indenter that is pressed straight down; "
+            "sliding friction shifts and skews the stress at the base of the film.",
+            cure="Give a scan whose indenter was pressed at each place. What stress a sliding one "
+            "made, memscal restore finds.",
         )
 
 
@@ -251,6 +267,8 @@ class Scan:
     channels : mapping of str to ndarray, shape of ``u_zz``
         Further channels (``u_xz``, ``u_yz``), in V, and where stated their noise
         (``u_xz_errors``, ``u_yz_errors``).
+    motion : str
+        ``"pressed"`` at each place, which an empty one stands for, or ``"sliding"``.
     lubrication, lubricant : str
         ``"dry"`` or ``"lubricated"``, empty if not stated, and the name of the lubricant.
     title, start_time, end_time, notes : str
@@ -309,6 +327,7 @@ class Scan:
     channels: Mapping[str, FloatArray] = field(default_factory=dict)
     load_uncertainty: float | None = None
     rod_friction: float | None = None
+    motion: str = ""
     lubrication: str = ""
     lubricant: str = ""
     title: str = ""
@@ -570,6 +589,11 @@ class Scan:
             raise InputError(
                 f"The lubrication of the scan is {self.lubrication!r}.",
                 cure="Give 'dry' or 'lubricated', or leave it out.",
+            )
+        if self.motion not in MOTIONS:
+            raise InputError(
+                f"The motion of the indenter is {self.motion!r}.",
+                cure="Give 'pressed' or 'sliding' (/entry/indenter/motion), or leave it out.",
             )
         if self.lubricant and self.lubrication != "lubricated":
             stated = self.lubrication or "not stated"

@@ -95,6 +95,10 @@ def test_an_altered_file_is_used_by_no_command_unless_that_is_recorded(run, scan
             replace(SCAN, indenter=memscal.Sphere(radius=0.1288)),
             ("made with a sphere", "needs a rod"),
         ),
+        (
+            replace(SCAN, motion="sliding"),
+            ("made with a sliding indenter", "entry/indenter/motion"),
+        ),
     ],
 )
 def test_a_scan_of_no_use_is_refused(refused, scan, words):

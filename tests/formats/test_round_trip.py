@@ -62,6 +62,7 @@ def test_all_that_a_scan_may_state_comes_back(kind, direction):
         film=film,
         normal_load_errors=errors,
         time=np.where(count % 33 == 4, np.nan, 0.25 * count),
+        motion="pressed",
         lubrication="lubricated",
         lubricant="glycerol, 99 %",
         direction="x" if kind == "raster" else direction,

@@ -38,6 +38,7 @@ SCANS = tuple(
         load_cell=LoadCell(name="balance", serial_number="7"),
         width=3e-3,
         lubrication=lubrication,
+        motion="sliding",
         position_scale_uncertainty=scale,
         gain_uncertainty=scale,
         stage=Equipment(name="stage", serial_number="8"),
