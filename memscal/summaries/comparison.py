@@ -289,9 +289,9 @@ def answer(comparison: FrictionComparison) -> str:
     if unexplained:
         loads = f"{' and '.join(unexplained)} profiles".strip()
         lines.append(f"No friction coefficient explains the {loads}{_wrong(comparison)}")
-    for lubrication, by_loading in comparison.joint.items():
-        if lubrication in unexplained:
-            continue
+    # The others share every input with those: theirs is no interval either.
+    explained = {} if unexplained else comparison.joint
+    for lubrication, by_loading in explained.items():
         estimates = list(by_loading.values())
         loadings: dict[str, str] = {}
         for loading, estimate in by_loading.items():

@@ -116,11 +116,18 @@ def on_another_film(made):
         (over_a_plane, r"was scanned over x and y(.|\n)*line scan"),
         (lambda made: made.rod, r"made with a rod, not with a sphere[\s\S]*calibrate"),
         (on_another_film, "another film or sphere"),
+        (lambda made: replace(made.dry, motion="sliding"), "sliding indenter"),
     ],
 )
 def test_scans_that_cannot_be_compared_are_refused(made, apparatus, scans, words):
     with pytest.raises(InputError, match=words):
         memscal.compare(scans(made), apparatus)
+
+
+def test_a_stress_under_a_sliding_sphere_is_refused_too(made, apparatus):
+    measured = memscal.measure_stress(replace(made.dry, motion="sliding"), apparatus)
+    with pytest.raises(InputError, match="sliding indenter"):
+        memscal.compare(measured, apparatus)
 
 
 @pytest.mark.parametrize(
@@ -304,6 +311,7 @@ def test_the_one_input_is_named_that_is_not_as_stated(made, apparatus, kept, cha
         assert factors == {}
         assert "nor does a factor on radius" in found.answer()
     assert found.answer().startswith("No friction coefficient explains the dry")
+    assert "μ" not in found.answer()
     for joint in found.to_dict()["joint"]:
         if joint["lubrication"] == "dry":
             assert joint["interval"]["low"] is joint["interval"]["high"] is joint["value"] is None

@@ -23,6 +23,8 @@ from memscal.model.quantities import MM, PER_MM, PER_MM2
 from memscal.summaries.declared import total_of
 from memscal.summaries.table import Table
 
+#: Percent that are shown whole.
+_WHOLE = 100
 #: Sources of the budget that count what is taken for granted, where they have other names.
 _COUNTED_AS = {"stage_scale": "position_scale", "film_law": "model_form", "load_scale": "load"}
 
@@ -195,7 +197,10 @@ def _stated(certificate: Certificate, value: CertifiedValue) -> str:
 
 
 def _share(value: CertifiedValue) -> str:
-    return f"{100 * value.expanded / abs(value.value):.2g} %" if value.quantity.unit else "–"
+    if not value.quantity.unit:
+        return "–"
+    share = 100 * value.expanded / abs(value.value)
+    return f"{share:.2g} %" if share < _WHOLE else f"{share:.0f} %"
 
 
 def _values(certificate: Certificate) -> Made:
@@ -227,7 +232,9 @@ def _equipment(certificate: Certificate) -> Made:
     rows: Rows = []
     for item in certificate.equipment:
         kind = certificate.words("kinds", item.get("kind", ""))
-        rows.append([kind, *(item[key] or "" for key in ("name", "serial", "certificate", "date"))])
+        rows.append(
+            [kind, *(item.get(key) or "" for key in ("name", "serial", "certificate", "date"))]
+        )
     return (), rows
 
 

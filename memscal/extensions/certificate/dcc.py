@@ -98,10 +98,17 @@ def _words(text: str) -> Tree:
 
 
 def _equipment(certificate: Certificate, item: Mapping[str, str]) -> Tree:
-    serial = {"issuer": "manufacturer", "value": item["serial"], "name": _words("serial_number")}
-    words = _words(f"{certificate.words('xml', 'certificate_of')} {item['date']}")
-    document = {"issuer": "other", "value": item["certificate"], "name": words}
-    return {"name": _words(item["name"]), "identifications": {"identification": [serial, document]}}
+    # An incomplete certificate may lack any of them.
+    words = _words(f"{certificate.words('xml', 'certificate_of')} {item.get('date', '')}".strip())
+    stated = (
+        ("manufacturer", item.get("serial"), _words("serial_number")),
+        ("other", item.get("certificate"), words),
+    )
+    known = [
+        {"issuer": issuer, "value": value, "name": name} for issuer, value, name in stated if value
+    ]
+    name = _words(item.get("name") or "")
+    return {"name": name, "identifications": {"identification": known}}
 
 
 def _real(value: float, unit: str) -> Tree:

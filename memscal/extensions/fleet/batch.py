@@ -3,7 +3,7 @@
 import hashlib
 import os
 import shutil
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
 from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
@@ -43,6 +43,7 @@ from memscal.version import __version__
 _LONGEST_STEM = 80
 #: Shards, as many as balance the workers, and the scans of one.
 _SHARDS = 64
+_NAMED = 3
 _SMALLEST = 4
 _LARGEST = 256
 
@@ -155,18 +156,12 @@ class Batch:
             self._require_same(begun.get("options", {}))
         balanced = min(max(_SMALLEST, -(-count // _SHARDS)), _LARGEST)
         size = self.shard_size or begun.get("shard_size") or balanced
-        shards = -(-count // size)
-        numbers = [int(path.stem.rpartition("-")[2]) for path in done]
-        if max(numbers, default=0) >= shards:
-            raise OutputError(
-                f"{results} has shard {max(numbers)}; this batch ends at {shards - 1}.",
-                why=stays,
-                cure="Resume with the manifest and the --shard-size that it was begun with.",
-            )
+        sized = replace(self, shard_size=size, count=count)
+        if not self.anew:
+            sized._require_same_scans(done)
         # Workers see the same files from folders of their own.
         sources = [Path(os.path.realpath(path)) for path in self.sources]
-        results = Path(os.path.realpath(results))
-        return replace(self, sources=sources, results=results, shard_size=size, count=count)
+        return replace(sized, sources=sources, results=Path(os.path.realpath(results)))
 
     def _require_same(self, before: Mapping[str, str]) -> None:
         """Refuse to go on with other options than before, and name each."""
@@ -181,6 +176,25 @@ class Batch:
                 f"{self.results} was begun with other options: {'; '.join(changed)}.",
                 why="Nothing was touched.",
                 cure="Give the options as they were, or another folder; --force does all anew.",
+            )
+
+    def _require_same_scans(self, done: Iterable[Path]) -> None:
+        """Refuse to go on with other scans than before; more of them may follow."""
+        tables = {path: _paths_in(path) for path in done}
+        for shard in self.shards():
+            stored = tables.pop(self.table(shard), [])
+            before = [os.path.realpath(self.results / name) for name in stored]
+            scans = shard.scans[: len(stored)]
+            if before != [os.path.realpath(self.folder / scan.path) for scan in scans]:
+                tables = {self.table(shard): stored}
+                break
+        for path, stored in tables.items():
+            raise InputError(
+                f"{self.results} holds results of other scans: {', '.join(stored[:_NAMED])}, in "
+                f"{path.name}.",
+                why="Nothing was touched.",
+                cure="Give the scans, and --shard-size, as they were, with new ones at the end; or "
+                "another folder. --force does all anew.",
             )
 
     def _counted(self) -> int:
@@ -240,6 +254,14 @@ class Batch:
                 why="They were killed or ran out of memory, with one shard several times.",
                 cure="Give the workers more memory, and run the same command with --resume.",
             )
+
+
+def _paths_in(table: Path) -> list[str]:
+    """Return the scans of a shard's table; of a damaged one, which is made anew, none."""
+    with suppress(MemscalError):
+        paths: list[str] = read_shard(table)["path"].to_pylist()
+        return paths
+    return []
 
 
 def _sha256_of(value: object) -> str:

@@ -99,7 +99,7 @@ def attempt_all(
         for name, error in refused.items()
     ]
     further = {"problems": problems, "notes": marked_texts(notes)}
-    causes = [(name, error.problem, error.cure) for name, error in refused.items()]
+    causes = [(name, f"{e.problem} {e.why}".strip(), e.cure) for name, e in refused.items()]
     table = Table("Refused", ("input", "problem", "cure"), causes)
     emit_counts("Tables", numbers, further, table, as_json=as_json)
     if not as_json:

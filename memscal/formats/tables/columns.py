@@ -192,9 +192,9 @@ class NamedColumns:
             raise InputError(
                 f"{self._name} has no column {column!r}.",
                 why=self._unfit or "Its columns are: " + ", ".join(self.names) + ".",
-                cure="Give one of these names, or a number counted from 1 where no name is a "
-                "number. If the columns of the table are others, state what separates its cells "
-                "(--delimiter).",
+                cure="Give the name of one of its columns, or a number counted from 1 where no "
+                "name is a number. If the columns of the table are others, state what separates "
+                "its cells (--delimiter).",
             )
         return int(sought) - 1
 

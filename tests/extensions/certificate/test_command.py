@@ -26,6 +26,11 @@ def test_a_certificate_is_replaced_only_if_forced_and_is_told_as_json(run, input
     assert made["number"].encode() in Path("c.xml").read_bytes()
     assert made["conformity"] == []
     assert ["gain" in made["missing"][0], "scale" in made["missing"][1]] == [True, True]
+    with Path("lab.toml").open("a", encoding="utf-8") as lab:
+        lab.write('\n[[equipment]]\nname = "gauge"\n')
+    lines = run("certificate", *inputs, "--force", "--json").exits(0).json["missing"]
+    assert sum("serial" in line for line in lines) == 1
+    run("certificate", *inputs[:-1], "c.html").exits(0)
 
 
 def test_without_typst_the_pdf_is_refused_with_the_extra(run, inputs, monkeypatch):
