@@ -459,7 +459,8 @@ def _example(table: Path, missing: Sequence[str], options: Options) -> str:
         return "See the examples of `memscal import --help`."
     line = ["memscal", "import", str(table)]
     for name in ("x", "u"):
-        line += [f"--{name}", options[name] or free.pop(0)]
+        if options[name] or name in missing:
+            line += [f"--{name}", options[name] or free.pop(0)]
     return (
         f"The columns of {table.name} are {', '.join(columns[:_NAMED])}. For instance: "
         f"{shlex.join([*line, '-o', f'{table.stem}.h5'])}"

@@ -67,5 +67,7 @@ def test_a_refusal_shows_the_command_for_the_own_table(run, folder):
     asked = ("import", "my log.csv", "-o", "scan.h5", "--x", "Weg", "--u", "Signal")
     run(*asked).exits(3, "as in 'Signal/mV'")
     run(*asked, "--u-unit", "mV").exits(3, "as in 'Weg/mm'")
+    moved = ("import", "my log.csv", "-o", "scan.h5", "--time", "Weg", "--speed", "1")
+    run(*moved).exits(2, "memscal import 'my log.csv' --u Signal -o")
     refusal = run("batch", "my log.csv", "-o", "results").exits(3, "recipe").err
     assert str(folder) not in refusal
