@@ -289,7 +289,7 @@ def answer(comparison: FrictionComparison) -> str:
     if unexplained:
         loads = f"{' and '.join(unexplained)} profiles".strip()
         lines.append(f"No friction coefficient explains the {loads}{_wrong(comparison)}")
-    # The others share every input with those: theirs is no interval either.
+    # The others share every input with those: no interval of theirs holds either.
     explained = {} if unexplained else comparison.joint
     for lubrication, by_loading in explained.items():
         estimates = list(by_loading.values())

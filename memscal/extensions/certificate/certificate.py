@@ -210,9 +210,9 @@ def certify(
             f"The certificate lacks: {listed}.",
             why="A certificate states who calibrated what for whom, with what and when, and every "
             "uncertainty that counts (ISO/IEC 17025:2017, 7.8.2 and 7.8.4).",
-            cure="State each where it is said; calibrate again with what the scan states then. A "
-            "failed check has a cause to find. Or write a certificate that says what it lacks "
-            "(--incomplete).",
+            cure="State each as the list says, and calibrate again with a scan that states it. "
+            "Find the cause of a failed check (memscal explain). Or write a certificate that says "
+            "what it lacks (--incomplete).",
         )
     other = values.pop(_OTHER, None)
     certified = [value for value in values.values() if value.determined]

@@ -43,9 +43,10 @@ from memscal.version import __version__
 _LONGEST_STEM = 80
 #: Shards, as many as balance the workers, and the scans of one.
 _SHARDS = 64
-_NAMED = 3
 _SMALLEST = 4
 _LARGEST = 256
+#: Scans that a message names.
+_NAMED = 3
 
 
 @dataclass(frozen=True)
@@ -188,7 +189,8 @@ class Batch:
             if before != [os.path.realpath(self.folder / scan.path) for scan in scans]:
                 tables = {self.table(shard): stored}
                 break
-        for path, stored in tables.items():
+        if tables:  # one that differs, or those beyond the last scan
+            path, stored = next(iter(tables.items()))
             raise InputError(
                 f"{self.results} holds results of other scans: {', '.join(stored[:_NAMED])}, in "
                 f"{path.name}.",
