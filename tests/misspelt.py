@@ -32,6 +32,7 @@ def calls(
     memscal.restore(scan, apparatus, lod=1.0)  # type: ignore[call-arg]
     memscal.monte_carlo(calibration, draw=10)  # type: ignore[call-arg]
     memscal.indent(film, rod, load=1.0, backend="fem").plot(figsize=(3.15, 2.4))
+    memscal.indent(film, rod, load=1.0).plot(figsiz=(3.15, 2.4))  # type: ignore[call-arg]
     memscal.indent(film, rod, load=1.0, backend="fme")  # type: ignore[call-overload]
     memscal.import_table({}, x="x", u="u", layout=memscal.TableLayout(x_unit="mm"))
     memscal.import_table({}, x="x", u="u", x_unit="mm")  # type: ignore[call-arg]

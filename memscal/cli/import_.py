@@ -402,7 +402,7 @@ def convert(
         if scan.holds is not None:
             out.write_files(out.rendered(scan.holds.plot, options["figure"] or ()), force=force)
     texts = [
-        f"Not stated: {row['words']:<38}{row['option']:<31}{row['cost']}"
+        f"Not stated: {row['words']:<38}{row['option']:<33}{row['cost']}"
         for row in not_stated(scan)
     ]
     return [*scan.messages, *import_notes(texts)]

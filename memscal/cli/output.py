@@ -206,7 +206,7 @@ def emit_result(
     others = further or {}
     if as_json:
         values = {name: other.to_dict() for name, other in others.items()}
-        emit_json({"schema_version": "1", **head, **result.to_dict(), **values})
+        emit_json({**head, **result.to_dict(), **values})
     elif brief:
         kept = result.answer().split("\n")
         while len(folded("\n".join(kept), _columns())) > _BRIEF and len(kept) > 1:

@@ -94,6 +94,16 @@ def drawn_as(
     style: Any,
 ) -> Figure:
     """Draw a figure with a coverage factor and a style, of a size in inches, or some panels."""
+    try:
+        Figure(figsize)
+        with mpl.rc_context():
+            styles.use(style)
+        if not k > 0:
+            raise ValueError("no band is drawn with it")
+    except (KeyError, OSError, TypeError, ValueError) as error:
+        problem = f"No figure has figsize={figsize!r}, k={k!r} and style={style!r}: {error}."
+        cure = "Give width and height in inches, and styles of matplotlib or its settings."
+        raise InputError(problem, cure=cure) from error
     token = _LOOK.set((k, style, not panels))
     try:
         figure = draw()

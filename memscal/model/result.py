@@ -8,13 +8,14 @@ from __future__ import annotations
 
 from functools import partial
 from html import escape
-from typing import TYPE_CHECKING, Any
+from inspect import signature
+from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
 from memscal import extensions
-from memscal.errors import InputError
+from memscal.errors import InputError, require_names
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
     from os import PathLike
 
     import pandas as pd
@@ -23,6 +24,16 @@ if TYPE_CHECKING:
 
 #: Dots of a figure in a notebook, per inch.
 _IN_A_NOTEBOOK = 100.0
+
+
+class PlotOptions(TypedDict, total=False):
+    """What some figures take: contacts beside it, the name of a figure, what is drawn, or varied."""
+
+    beside: Sequence[Any]
+    name: str
+    lubrication: str
+    loading: str
+    vary: str
 
 
 class Drawn:
@@ -34,8 +45,8 @@ class Drawn:
         figsize: tuple[float, float] | None = None,
         k: float = 2.0,
         panels: str | Sequence[str] = (),
-        style: Any = (),
-        **options: Any,
+        style: str | Mapping[str, Any] | Sequence[str | Mapping[str, Any]] = (),
+        **options: Unpack[PlotOptions],
     ) -> Figure:
         """Draw the result; the figure is returned, and nothing is shown or written.
 
@@ -51,10 +62,18 @@ class Drawn:
         style : str, mapping, or several
             Styles of matplotlib, or its settings, on top of ours.
         **options
-            What else the figure of this result takes.
+            What else the figure of this result takes: of a comparison ``name``, ``lubrication``
+            and ``loading``, of a contact others ``beside`` it, of a design what to ``vary``.
+
+        Raises
+        ------
+        InputError
+            If the figure has no such option or panel, or cannot have such a size or style.
         """
         module, _, function = extensions.VIEWS[type(self).__name__][1].rpartition(".")
-        draw = partial(getattr(extensions.module(module), function), self, **options)
+        figure_of = getattr(extensions.module(module), function)
+        require_names("The figure has no option", options, [*signature(figure_of).parameters][1:])
+        draw = partial(figure_of, self, **options)
         chosen = [panels] if isinstance(panels, str) else panels
         figure: Figure = extensions.hook("drawn_as")(draw, figsize, k, chosen, style)
         return figure
@@ -97,7 +116,8 @@ class Told:
         """Return values with standard uncertainties and units, as JSON holds them.
 
         The keys are those that the command which makes such a result prints with ``--json``; its
-        JSON Schema, in ``memscal/cli/schemas``, describes each.
+        JSON Schema, in ``memscal/cli/schemas``, describes each.  A contact is one of the
+        ``solutions`` of ``memscal reference``.
         """
         return dict(_shown_as("mapping", self))
 

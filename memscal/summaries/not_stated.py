@@ -16,6 +16,7 @@ def not_stated(scan: Scan) -> list[Values]:
         owner = getattr(scan, row["of"]) if "of" in row else scan
         value = getattr(owner, row["name"], "")
         missing = value is None or (isinstance(value, str) and not value)
-        if owner is not None and shape in row and missing:
+        applies = all(getattr(scan, name) is not None for name in row.get("needs", ()))
+        if applies and shape in row and missing:
             rows.append({**row, "cost": row[shape]})
     return rows

@@ -65,6 +65,7 @@ def mapping(restored: Restoration) -> Values:
         calculated = members(RESTORED_AGAINST, comparison, origin=_origin(comparison))
     stress = [_PROFILE[name] for name in ("r", "sigma_zz", "sigma_zz_errors")]
     return {
+        "schema_version": "1",
         **members(_determined(restored).values(), restored, **_values(restored)),
         "reconvolution": {
             "chi2_reduced": finite(restored.chi_square / restored.degrees),

@@ -35,6 +35,7 @@ def mapping(stress: MeasuredStress) -> Values:
             }
         )
     return {
+        "schema_version": "1",
         **declared.members(applied, stress, **_force_over_load(stress)),
         "profiles": profiles,
         "overridden": list(stress.overridden),

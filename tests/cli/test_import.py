@@ -59,6 +59,15 @@ def test_an_import_ends_with_what_is_not_stated(run):
     assert "--load-uncertainty" in told
 
 
+@pytest.mark.usefixtures("folder")
+def test_an_import_without_film_rod_and_load_names_them_and_no_cost_of_theirs(run):
+    write_log("F [N]")
+    told = run("import", "log.csv", "-o", "scan.h5", "--x", "x", "--u", "u").exits(0).out
+    options = [line.split("--")[1].split()[0] for line in told.splitlines() if "Not st" in line]
+    assert options[:3] == ["thickness,", "radius", "load"]
+    assert not {"load-uncertainty", "radius-uncertainty", "film-law", "rod-friction"} & {*options}
+
+
 def test_a_refusal_shows_the_command_for_the_own_table(run, folder):
     (folder / "my log.csv").write_text("Weg,Signal,Kraft\n" + "0.5,1.5,1\n" * 9, encoding="utf-8")
     shown = "memscal import 'my log.csv' --x Weg --u Signal -o"

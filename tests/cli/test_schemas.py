@@ -4,9 +4,12 @@ import copy
 
 import pytest
 from golden.make import load
+from helpers.friction_results import comparison
+from helpers.scans import known_apparatus, measured, pressed, sphere_scan
 from helpers.schemas import SCHEMAS, faults
 from jsonschema import Draft202012Validator
 
+import memscal
 from memscal.extensions import COMMANDS, module
 
 SHARED = "common"
@@ -73,3 +76,18 @@ def test_what_is_printed_follows_its_schema(run, scan, artifact, line):
     assert faults(line.split()[0], done.json) == []
     if line.startswith("batch") and "--dry-run" not in line:
         assert faults("summary", run("summary", "results", "--json").json) == []
+
+
+@pytest.mark.parametrize(
+    ("command", "result"),
+    [
+        ("calibrate", lambda: memscal.calibrate(memscal.simulate(seed=1, points=33))),
+        ("calibrate", lambda: memscal.calibrate(memscal.simulate(seed=1, points=33)).apparatus),
+        ("apply", measured),
+        ("restore", lambda: memscal.restore(sphere_scan(pressed(), seed=1), known_apparatus())),
+        ("compare", comparison),
+        ("design", lambda: memscal.design(step=0.5e-3, repeats=2)),
+    ],
+)
+def test_a_dictionary_follows_the_schema_of_its_command(command, result):
+    assert faults(command, result().to_dict()) == []

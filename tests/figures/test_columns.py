@@ -45,6 +45,22 @@ def test_panels_are_named_by_letter_or_label_and_a_wrong_one_is_refused(apparatu
         apparatus.plot(panels="scn")
 
 
+@pytest.mark.parametrize(
+    ("asked", "words"),
+    [
+        ({"figsiz": (3.0, 2.0)}, "no option figsiz"),
+        ({"vary": "step"}, "no option vary"),
+        ({"figsize": (-1.0, 2.0)}, r"figsize=\(-1.0, 2.0\)"),
+        ({"k": 0.0}, "k=0.0"),
+        ({"style": "no style"}, "style='no style'"),
+        ({"style": {"axes.labelsiz": 3}}, "axes.labelsize"),
+    ],
+)
+def test_what_no_figure_has_is_refused(apparatus, asked, words):
+    with pytest.raises(memscal.MemscalError, match=words):
+        apparatus.plot(**asked)
+
+
 def test_bands_have_the_coverage_factor_that_is_asked_for(apparatus):
     heights = []
     for k in (1.0, 3.0):

@@ -159,6 +159,7 @@ def mapping(fleet: FleetResults) -> Values:
         for i, text in list(outliers(fleet).items())[:_MOST_ROWS]
     ]
     return {
+        "schema_version": "1",
         **counts(fleet),
         "checks": failures(fleet),
         **{name: _distribution(fleet, symbol) for symbol, name in SUMMARISED.items()},

@@ -118,6 +118,7 @@ def mapping(planned: Design) -> Values:
             "budget": declared.plain(planned.budget[name], ESTIMATED[name].scale),
         }
     return {
+        "schema_version": "1",
         "planned": True,
         "method": planned.method,
         "plan": declared.members(PLAN, planned.plan),
