@@ -60,7 +60,7 @@ baseline_curvature: fitted curvature of the baseline over what its prior and noi
 reference_force: total force of the reference against its load
     check the reference's load and the reach of its table
 indentation: what a neo-Hookean film would change of A or of the width, over its uncertainty
-    give the film's law (--film-law) or none, or lighten the load
+    state --film-law neo-hookean, or no law, which is then counted; or lighten the load
 outliers: share of points with less than half of their weight
     find what disturbs these points
 saturation: number of points at a ceiling near the largest voltage (not of a shear)

@@ -311,7 +311,7 @@ def answer(comparison: FrictionComparison) -> str:
         taken = ""
         if any(moved) and lubrication == "lubricated":
             largest_move = max(filter(None, moved), key=abs)
-            taken = f"; it moves the others by {largest_move:.2f} of itself"
+            taken = f"; an error of it moves the others by {largest_move:.2f} of that"
         name = (lubrication or "all contacts").capitalize()
         lines.append(f"{name}: μ{_EQUALS[estimates[0].kind]} {stated}{level}{taken}.")
     friction = "\n".join(lines)
