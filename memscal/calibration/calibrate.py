@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import field, replace
+from os import PathLike
 from typing import TYPE_CHECKING, Any, Literal
 
 from memscal.apparatus import ApparatusFunction
@@ -37,6 +38,7 @@ from memscal.model.assumptions import Assumption
 from memscal.model.film import LINEAR, FilmLaw
 from memscal.model.notation import VOLTS, Reading
 from memscal.model.result import Result
+from memscal.model.scan import Scan
 from memscal.model.sizes import MOST_OF_LINES
 from memscal.parallel import single_threaded
 from memscal.progress import Listener, done_with, in_steps, reported
@@ -138,6 +140,7 @@ def calibrate(
     correlations: Correlations | None = None,
     pixel_size: float | None = None,
     free: Literal["thickness"] | Sequence[Literal["thickness"]] = (),
+    noise_record: Scan | str | PathLike[str] | None = None,
     seed: int = 0,
     override: bool = False,
     accept_altered: bool = False,
@@ -197,6 +200,9 @@ def calibrate(
         ``"thickness"`` estimates the thickness of the film from scans with several rods, or at
         several loads on a film of a stated law that is not linear; what the film states is its
         Gaussian prior.  The film of the result has the posterior mean and standard uncertainty.
+    noise_record : Scan or path, optional
+        Readings of the sensor at rest (``memscal import --noise-record``), whose noise, in size and
+        correlation, the scans' readings have at their times, in place of a stated one.
     seed : int, default 0
         Seed of methods that draw random numbers.
     override : bool, default False
@@ -230,7 +236,9 @@ def calibrate(
     >>> 0.54e-3 < calibration.apparatus.gaussian_sigma < 0.58e-3
     True
     """
-    scans = opened_scans(scan, MOST_OF_LINES, accept_altered=accept_altered)
+    scans = opened_scans(
+        scan, MOST_OF_LINES, accept_altered=accept_altered, noise_record=noise_record
+    )
     request = Request(
         method=chosen_method(method, options, seed=seed),
         reference=reference,

@@ -9,11 +9,11 @@ from memscal.cli import output as out
 from memscal.cli.failures import exit_code_of
 from memscal.cli.options import (
     artifact_argument,
+    contact_options,
     figure_option,
     out_option,
     report_options,
     scans_argument,
-    trust_options,
 )
 
 EXAMPLES = """\b
@@ -28,7 +28,7 @@ Examples:
 @artifact_argument
 @scans_argument()
 @out_option("File to write (memscal-stress). By default beside the first scan: SCAN.stress.h5.")
-@trust_options
+@contact_options
 @figure_option("Draw the profiles of all loads, linear and logarithmic.")
 @report_options
 def command(artifact: Path, scans: tuple[Path, ...], **options: Any) -> int:
@@ -45,9 +45,12 @@ def command(artifact: Path, scans: tuple[Path, ...], **options: Any) -> int:
 
     written = options["output"] or out.default_name(scans[0], ".stress.h5")
     outputs = [written, *options["figures"], options["report"]]
-    out.prove_writable(outputs, force=options["force"], inputs=[artifact, *scans])
+    out.prove_writable(
+        outputs, force=options["force"], inputs=[artifact, *scans, options["noise_record"]]
+    )
     with out.working("Measuring"):
-        accepted = {name: options[name] for name in ("override", "accept_altered")}
+        names = ("noise_record", "override", "accept_altered")
+        accepted = {name: options[name] for name in names}
         stress = measure_stress(scans, artifact, **accepted)
     out.deliver(stress, written, stress.save, options)
     return exit_code_of(stress.checks)

@@ -25,6 +25,7 @@ from memscal.cli.options import (
     figure_option,
     force_option,
     json_option,
+    noise_record_option,
     option,
     options_of,
     out_option,
@@ -243,6 +244,7 @@ def calibration_settings(
 @option("--compact", is_flag=True)(
     "Leave G over the plane out of the artifact where it is round, which halves its size."
 )
+@noise_record_option
 @force_option
 @option("--dry-run", is_flag=True)(
     "Read and check every input, print what would be done, and write nothing."
@@ -260,6 +262,7 @@ def command(
     sweeping: bool,
     sweep_figure: Path | None,
     draws: int | None,
+    noise_record: Path | None,
     compact: bool,
     force: bool,
     dry_run: bool,
@@ -282,9 +285,9 @@ def command(
     ending = ".apparatus.h5" if channel == "zz" else f".{channel}.apparatus.h5"
     output = output or out.default_name(scans[0], ending)
     settings = calibration_settings(reference=reference, alternative=alternative, **settings)
-    data = _read(scans, reference, settings)
+    data = _read(scans, reference, noise_record, settings)
     outputs = list(filter(None, (output, report, *figures, sweep_figure)))
-    out.prove_writable(outputs, force=force, inputs=[*scans, reference, alternative])
+    out.prove_writable(outputs, force=force, inputs=[*scans, reference, alternative, noise_record])
     if dry_run:
         _rehearse(data, settings, outputs, as_json)
         return DONE
@@ -314,11 +317,14 @@ def command(
     return exit_code_of(apparatus.checks, then=then)
 
 
-def _read(paths: tuple[Path, ...], reference: Path | None, settings: Options) -> Sequence[Scan]:
+def _read(
+    paths: tuple[Path, ...], reference: Path | None, noise_record: Path | None, settings: Options
+) -> Sequence[Scan]:
     from memscal.formats.opened import opened_scans
     from memscal.model.sizes import MOST_OF_LINES
 
-    scans = opened_scans(paths, MOST_OF_LINES, accept_altered=settings["accept_altered"])
+    stated = {"accept_altered": settings["accept_altered"], "noise_record": noise_record}
+    scans = opened_scans(paths, MOST_OF_LINES, **stated)
     for scan, path in zip(scans, paths, strict=True):
         if reference is not None and scan.reference is not None:
             out.note(f"{reference.name} is used in place of the reference in {path.name}.")

@@ -16,11 +16,11 @@ from memscal.cli.options import (
     NonNegative,
     Options,
     artifact_argument,
+    contact_options,
     figure_option,
     option,
     report_options,
     scans_argument,
-    trust_options,
 )
 from memscal.figures import FIGURE_SUFFIXES
 from memscal.formats.files import together
@@ -120,7 +120,7 @@ Examples:
     "Also explain the profiles by an interface that yields before it slips, at the "
     "macroscopic friction, and report which of the two explanations is more likely."
 )
-@trust_options
+@contact_options
 @option("--cache", FILE, metavar="FOLDER")(
     "Where calculated contacts are kept for the next run.  [default: memscal/contacts in "
     "the user's cache folder]"
@@ -161,7 +161,7 @@ def command(
     apparatus = load_apparatus(artifact, **accepted)
     channel = options["channel"]
     _require_channel(apparatus, artifact, channel)
-    data = opened_contacts(scans, **accepted)
+    data = opened_contacts(scans, noise_record=options["noise_record"], **accepted)
     references = [read_reference(path, **accepted) for path in options["references"]]
     page_figures = options["figures"]
     report = options["report"]
@@ -171,6 +171,7 @@ def command(
     if folder is not None and not folder.is_dir():
         outputs = [*page_figures, folder, report]  # the folder is made at the end
     inputs = [artifact, *scans, *options["references"], options["shear"]]
+    inputs.append(options["noise_record"])
     out.prove_writable(outputs, force=force, inputs=inputs)
     friction = options["friction"]
     settings = {name: options[name] for name in _SETTINGS}

@@ -172,6 +172,16 @@ _NAMED = 12
     "Scan: distance of neighbouring places, in mm. They are counted by --x or, with --holds and "
     "without --x, by the presses of the load or the depth."
 )
+@option("--averaging-length", Quantity("mm"))(
+    "Scan: way over which each reading is the mean, in mm, centred on its position."
+)
+@option("--dwell dwell_time", NonNegative("s"))(
+    "Scan: how long the indenter was held at each place before its reading, in s."
+)
+@option("--noise-record motion", flag_value="rest")(
+    "Readings in time (--time) with nothing pressed, without --x: what --noise-record of other "
+    "commands takes."
+)
 @option("--u-errors", "COLUMN")("Scan: column of each reading's standard uncertainty.")
 @option("--noise", Quantity("unit of u"))(
     "Scan: standard uncertainty of each reading, one number, in the unit of u."
@@ -394,6 +404,7 @@ def convert(
             write_reference(reference.profile, output, overwrite=force)
         return reference.notes
     from memscal.formats.scan import write_scan
+    from memscal.readings.noise_record import noise_of
     from memscal.summaries.not_stated import not_stated
 
     scan = read_table(table, options)
@@ -401,6 +412,8 @@ def convert(
         write_scan(scan, output, overwrite=force)
         if scan.holds is not None:
             out.write_files(out.rendered(scan.holds.plot, options["figure"] or ()), force=force)
+    if scan.motion == "rest":
+        return [*scan.messages, *import_notes([noise_of(scan).text(scan.reading)])]
     texts = [
         f"Not stated: {row['words']:<38}{row['option']:<33}{row['cost']}"
         for row in not_stated(scan)

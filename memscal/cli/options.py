@@ -200,7 +200,12 @@ override_option = option("--override", is_flag=True)(
 accept_altered_option = option("--accept-altered", is_flag=True)(
     "Use files although their content does not fit their digest: recorded in the output."
 )
-trust_options = options_of(override_option, accept_altered_option)
+noise_record_option = option("--noise-record", FILE)(
+    "Readings at rest (memscal import --noise-record): their noise, in size and correlation, is "
+    "that of the scans, at the times of the readings."
+)
+contact_options = options_of(noise_record_option, override_option, accept_altered_option)
+"""How scans of contacts are read."""
 output_options = options_of(json_option, force_option, debug_option)
 report_options = options_of(brief_option, report_option, output_options)
 """Those of commands that answer in a few lines and can write a report."""

@@ -13,11 +13,11 @@ from memscal.cli.options import (
     FILE,
     Quantity,
     artifact_argument,
+    contact_options,
     figure_option,
     option,
     out_option,
     report_options,
-    trust_options,
 )
 from memscal.errors import MemscalError
 
@@ -42,7 +42,7 @@ Examples:
     "friction, to be shown beside the result."
 )
 @option("--load", Quantity("N"))("Which load of a scan of several is restored, in N.")
-@trust_options
+@contact_options
 @figure_option("Draw the restored, the measured and the calculated stress, and residuals.")
 @report_options
 def command(artifact: Path, scan: Path, **options: Any) -> int:
@@ -60,13 +60,11 @@ def command(artifact: Path, scan: Path, **options: Any) -> int:
 
     output = options["output"]
     outputs = [output, *options["figures"], options["report"]]
-    out.prove_writable(
-        outputs, force=options["force"], inputs=[artifact, scan, options["expected"]]
-    )
+    inputs = [artifact, scan, options["expected"], options["noise_record"]]
+    out.prove_writable(outputs, force=options["force"], inputs=inputs)
     with out.working("Restoring"):
-        settings = {
-            name: options[name] for name in ("expected", "load", "override", "accept_altered")
-        }
+        names = ("expected", "load", "noise_record", "override", "accept_altered")
+        settings = {name: options[name] for name in names}
         restored = restore(scan, artifact, **settings)
         if settings["expected"] is None:
             try:

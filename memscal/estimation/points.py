@@ -119,6 +119,7 @@ class ScanPoints:
     owner: IndexArray  # (n,): number of the measurement that its scan is a part of
     anew: BoolArray  # (n,): whether each repeat has an error of its position of its own
     free: BoolArray  # (scans, 2): along x and y, whether the centre is a free parameter
+    averaging: FloatArray  # (scans, 2): way along x and y over which each reading is the mean, in m
     missing: int  # how many points were missing
     decorrelation: Decorrelation | None = None  # makes noise of the stated correlation white
     channel: str = "zz"
@@ -231,6 +232,7 @@ class ScanPoints:
             single,
             scan=np.zeros_like(single.scan),
             free=self.free[own],
+            averaging=self.averaging[own],
             curvature=self.curvature[own],
         )
 
@@ -238,7 +240,7 @@ class ScanPoints:
         """Return some of the points, without their correlations."""
         columns: dict[str, Any] = {}
         for name, value in vars(self).items():
-            if isinstance(value, np.ndarray) and name not in ("free", "curvature"):
+            if isinstance(value, np.ndarray) and name not in ("free", "averaging", "curvature"):
                 columns[name] = value[chosen]
         return replace(self, **columns, decorrelation=None)
 
@@ -320,6 +322,7 @@ def measured_points(scan: Scan, channel: str = "zz") -> ScanPoints:
     branch = np.zeros(u.shape, np.int64) if scan.branch is None else scan.branch
     correlation = None if channel_order(channel) else scan.u_zz_correlation
     count = int(keep.sum())
+    along = [scan.direction == "x", scan.direction == "y"]
     first = np.zeros(count, dtype=np.intp)
     points = ScanPoints(
         x=x[keep],
@@ -333,7 +336,8 @@ def measured_points(scan: Scan, channel: str = "zz") -> ScanPoints:
         anew=np.full(count, scan.position_errors_by_repeat),
         branch=branch[keep],
         scan=first,
-        free=np.array([[scan.direction == "x", scan.direction == "y" or scan.planar]]),
+        free=np.array([[along[0], along[1] or scan.planar]]),
+        averaging=np.array([along]) * (scan.averaging_length or 0.0),
         missing=u.size - count,
         decorrelation=None if correlation is None else _decorrelation(correlation, keep),
         channel=channel,
@@ -459,7 +463,8 @@ def joined_points(scans: Sequence[ScanPoints], owners: Sequence[int] | None = No
         )
     number = np.repeat(np.arange(len(scans)), [points.u.size for points in scans])
     before = np.cumsum([0, *(int(points.repeat.max()) + 1 for points in scans)])
-    names = ("x", "y", "u", "load", "x_errors", "branch", "anew", "free", "curvature", "repeat")
+    own = ("free", "averaging", "curvature")
+    names = ("x", "y", "u", "load", "x_errors", "branch", "anew", "repeat", *own)
     columns = {name: np.concatenate([getattr(each, name) for each in scans]) for name in names}
     columns["repeat"] += before[number]
     blocks = []

@@ -1,6 +1,7 @@
 """Scans, and the stress measured of them, given as objects or as the paths of their files."""
 
 from collections.abc import Hashable, Iterable, Sequence
+from dataclasses import replace
 from os import PathLike
 from typing import Any, TypeAlias
 
@@ -13,6 +14,7 @@ from memscal.formats.scan import scan_from
 from memscal.formats.stress import stress_from
 from memscal.model.measured_stress import MeasuredStress
 from memscal.model.scan import Scan
+from memscal.readings.noise_record import with_recorded_noise
 
 Scans: TypeAlias = Scan | FilePath | Sequence[Scan | FilePath]
 """One scan or several, each itself or as the path of its file."""
@@ -21,31 +23,46 @@ Contacts: TypeAlias = Scan | MeasuredStress | FilePath | Sequence[Scan | Measure
 """Scans, or the stress that was measured of them; each itself or as the path of its file."""
 
 
-def opened_scan(scan: Any, most: int | None = None, *, accept_altered: bool = False) -> Scan:
-    """Return a scan that is given itself or as a path, with ``most`` points in a file."""
+def opened_scan(
+    scan: Any, most: int | None = None, *, accept_altered: bool = False, noise_record: Any = None
+) -> Scan:
+    """Return a scan that is given itself or as a path, with ``most`` points in a file.
+
+    Its noise is that of a noise record, given in one of these ways, or else its own.
+    """
     if isinstance(scan, Scan):
-        return scan
-    if not isinstance(scan, str | PathLike):
+        opened = scan
+    elif isinstance(scan, str | PathLike):
+        with open_hdf5(scan, accept_altered=accept_altered) as file:
+            opened = scan_from(file, most)
+    else:
         raise InputError(
             f"{type(scan).__name__} is given where a Scan is needed.",
             cure="Give a scan, or the path of its file.",
         )
-    with open_hdf5(scan, accept_altered=accept_altered) as file:
-        return scan_from(file, most)
+    if noise_record is not None:
+        record = opened_scan(noise_record, accept_altered=accept_altered)
+        opened = replace(opened, noise_record=record)
+    return with_recorded_noise(opened)
 
 
 def opened_scans(
-    scans: Scans, most: int | None = None, *, accept_altered: bool = False
+    scans: Scans,
+    most: int | None = None,
+    *,
+    accept_altered: bool = False,
+    noise_record: Any = None,
 ) -> tuple[Scan, ...]:
     """Return scans that are given themselves or as paths, at least one; of ``most`` points each."""
     listed = listed_items(scans)
-    opened = [opened_scan(scan, most, accept_altered=accept_altered) for scan in listed]
+    stated = {"accept_altered": accept_altered, "noise_record": noise_record}
+    opened = [opened_scan(scan, most, **stated) for scan in listed]
     require_different(map(contents_of, opened))
     return tuple(opened)
 
 
 def opened_contacts(
-    contacts: Contacts, *, accept_altered: bool = False
+    contacts: Contacts, *, accept_altered: bool = False, noise_record: Any = None
 ) -> tuple[Scan | MeasuredStress, ...]:
     """Return scans and measured stresses that are given themselves or as paths, at least one."""
     opened: list[Scan | MeasuredStress] = []
@@ -55,9 +72,10 @@ def opened_contacts(
         elif isinstance(item, str | PathLike):
             with open_hdf5(item, accept_altered=accept_altered) as file:
                 is_stress = file.attribute("/", SCHEMA_ATTRIBUTE) == STRESS_SCHEMA
-                opened.append(stress_from(file) if is_stress else scan_from(file))
+                read = stress_from(file) if is_stress else scan_from(file)
+            opened.append(read if is_stress else opened_scan(read, noise_record=noise_record))
         else:
-            opened.append(opened_scan(item))
+            opened.append(opened_scan(item, noise_record=noise_record))
     require_different(contents_of(item) for item in opened if isinstance(item, Scan))
     return tuple(opened)
 

@@ -3,6 +3,8 @@
 import re
 from collections.abc import Iterator, Mapping
 
+import numpy as np
+
 from memscal.errors import FormatError, placed
 from memscal.formats import groups
 from memscal.formats.digest import require_schema, require_unaltered
@@ -23,6 +25,7 @@ from memscal.readings.ceiling import without_clipped
 _CHANNELS = ("u_xz", "u_xz_errors", "u_yz", "u_yz_errors")
 _DATA = "/entry/data"
 _SIGNAL = f"{_DATA}/u_zz"
+_NOISE = "/entry/noise_record"
 _SAMPLE = "/entry/sample"
 _DECLARED = by_name(records.SCAN_DATA.quantities)
 # The other arrays have the shape of the signal, which is that of the scan.
@@ -88,6 +91,14 @@ def scan_from(file: SafeFile, most: int | None = None) -> Scan:
         require_rod_friction(load.get("rod_friction"))
     film, indenter = groups.read_stated(file)
     reading = reading_of(file.units_of(_SIGNAL) or "V", file.where(_SIGNAL))
+    if file.attribute(_DATA, "axes") in ("time", ("time",)):
+        return Scan(
+            **_read_rest(file, _DATA, reading),
+            **groups.read_circumstances(file),
+            title=file.optional_text("/entry/title"),
+            notes=file.optional_text("/entry/notes/data"),
+            source=file.source,
+        )
     axes = _find_axes(file)
     points = axes == _POINTS
     only_y = axes is not None and not file.has(f"{_DATA}/x")
@@ -102,6 +113,10 @@ def scan_from(file: SafeFile, most: int | None = None) -> Scan:
     reference = None
     if file.has("/entry/reference"):
         reference = groups.read_profile(file, load=load["load"])
+    record = None
+    if file.has(_NOISE):
+        of_record = reading_of(file.units_of(f"{_NOISE}/u_zz") or "V", file.where(_NOISE))
+        record = Scan(**_read_rest(file, _NOISE, of_record))
     contact = read_record(records.SAMPLE, file, _SAMPLE)
     contact["lubrication"] = contact.get("lubrication", "").strip().lower()
     return Scan(
@@ -121,9 +136,20 @@ def scan_from(file: SafeFile, most: int | None = None) -> Scan:
         title=file.optional_text("/entry/title"),
         notes=file.optional_text("/entry/notes/data"),
         reference=reference,
+        noise_record=record,
         synthetic=_read_synthetic(file),
         source=file.source,
     )
+
+
+def _read_rest(file: SafeFile, path: str, reading: Reading) -> Values:
+    """Read a noise record: readings in time, at rest."""
+    arrays = {}
+    for name in ("time", "u_zz"):
+        dimension = _DECLARED[name].read_in(reading).dimension
+        arrays[name] = file.require_array(f"{path}/{name}", dimension, ndim=1)
+    arrays["x"] = np.zeros(arrays["u_zz"].size)
+    return {**arrays, "motion": "rest", "unit": reading.si}
 
 
 def _read_arrays(file: SafeFile, along: str, reading: Reading) -> Values:
@@ -174,8 +200,11 @@ def write_scan(scan: Scan, path: FilePath, *, overwrite: bool = False) -> None:
 def _entry(scan: Scan) -> Group:
     children: Nodes = {"title": scan.title} if scan.title else {}
     children |= groups.circumstances(scan)
-    children["data"] = _data_group(scan)
-    children["indenter"] = groups.indenter_group(scan.indenter, scan)
+    children["data"] = _rest_group(scan) if scan.motion == "rest" else _data_group(scan)
+    if scan.motion != "rest":
+        children["indenter"] = groups.indenter_group(scan.indenter, scan)
+    if scan.noise_record is not None:
+        children["noise_record"] = _rest_group(scan.noise_record)
     children["sample"] = groups.sample_group(scan)
     children["instrument"] = groups.instrument_group(scan)
     if scan.notes:
@@ -215,6 +244,11 @@ def _data_group(scan: Scan) -> Group:
     like_signal = {name: getattr(scan, name) for name in LIKE_SIGNAL}
     data |= _nodes(scan, axes, **like_signal, **scan.channels)
     return Group("NXdata", data, {"signal": "u_zz", "axes": axes})
+
+
+def _rest_group(record: Scan) -> Group:
+    data = _nodes(record, ("time",), time=record.time, u_zz=record.u_zz)
+    return Group("NXdata", data, {"signal": "u_zz", "axes": ("time",)})
 
 
 def _nodes(scan: Scan, axes: tuple[str, ...], **arrays: FloatArray | None) -> Nodes:

@@ -142,6 +142,7 @@ def compare(
     macroscopic: float | None = None,
     macroscopic_uncertainty: float | None = None,
     interface: bool = False,
+    noise_record: Scan | str | PathLike[str] | None = None,
     override: bool = False,
     accept_altered: bool = False,
     cache: CacheFolder = None,
@@ -193,6 +194,9 @@ def compare(
     interface : bool
         Whether to weigh laws of the interface against effective friction, at the macroscopic
         coefficient.
+    noise_record : Scan or path, optional
+        Readings of the sensor at rest (``memscal import --noise-record``), whose noise, in size and
+        correlation, the scans' readings have at their times, in place of a stated one.
     override : bool
         Whether to accept an artifact of another sensor or film; that is recorded.
     accept_altered : bool
@@ -230,7 +234,7 @@ def compare(
     True
     """
     # Prepare: open what is compared, and refuse what does not belong together.
-    opened = opened_contacts(contacts, accept_altered=accept_altered)
+    opened = opened_contacts(contacts, accept_altered=accept_altered, noise_record=noise_record)
     sensor = opened_apparatus(apparatus, accept_altered=accept_altered)
     tangential = None if shear is None else opened_apparatus(shear, accept_altered=accept_altered)
     _require_macroscopic(macroscopic, macroscopic_uncertainty, interface=interface)

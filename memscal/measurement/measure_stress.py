@@ -123,6 +123,7 @@ def measure_stress(
     scan: Scans,
     apparatus: ApparatusFunction | str | PathLike[str],
     *,
+    noise_record: Scan | str | PathLike[str] | None = None,
     override: bool = False,
     accept_altered: bool = False,
     progress: Listener = None,  # noqa: ARG001 - @reported
@@ -141,6 +142,9 @@ def measure_stress(
         Scans with a sphere or a rod; ``normal_load`` states the load of each line.
     apparatus : ApparatusFunction or path
         The calibrated sensor.
+    noise_record : Scan or path, optional
+        Readings of the sensor at rest (``memscal import --noise-record``), whose noise, in size and
+        correlation, the scans' readings have at their times, in place of a stated one.
     override : bool
         Accept a scan whose sensor, channel or film is not the artifact's: it is recorded in
         ``overridden``.
@@ -174,7 +178,7 @@ def measure_stress(
     True
     """
     sensor = opened_apparatus(apparatus, accept_altered=accept_altered)
-    scans = opened_scans(scan, accept_altered=accept_altered)
+    scans = opened_scans(scan, accept_altered=accept_altered, noise_record=noise_record)
     restore.require_covariance(sensor)
     overridden = accepted_alterations(sensor.source, *(data.source for data in scans))
     for data in scans:

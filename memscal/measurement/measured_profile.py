@@ -391,7 +391,10 @@ def measured_profile(
 
 
 def _points(scan: Scan, noise: FloatArray, restored: Restoration) -> Mapping[str, MeasuredPoints]:
+    # Readings that are means along the scan count as those at their positions.
+    raw = measured_points(restored.scan)
     normal = measured_points(scan)
+    normal = replace(normal, u=normal.u + restored.points.u - raw.u)
     if not noise.any():
         # Only the electronic noise scatters: it is that of the restoration.
         noise = np.full_like(noise, restored.noise.min())

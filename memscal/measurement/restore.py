@@ -357,6 +357,7 @@ def restore(
     *,
     load: float | None = None,
     expected: Expected = None,
+    noise_record: Scan | str | PathLike[str] | None = None,
     override: bool = False,
     accept_altered: bool = False,
 ) -> Restoration:
@@ -376,6 +377,9 @@ def restore(
         Which load of a scan of several, in N, to within 5 %.
     expected : StressProfile, Contact or path, optional
         A calculated base stress to hold against the restored one: adds a check.
+    noise_record : Scan or path, optional
+        Readings of the sensor at rest (``memscal import --noise-record``), whose noise, in size and
+        correlation, the scans' readings have at their times, in place of a stated one.
     override : bool
         Accept a scan whose sensor, channel or film is not the artifact's: a message records it.
     accept_altered : bool
@@ -402,7 +406,7 @@ def restore(
     True
     """
     sensor = opened_apparatus(apparatus, accept_altered=accept_altered)
-    measured = opened_scan(scan, accept_altered=accept_altered)
+    measured = opened_scan(scan, accept_altered=accept_altered, noise_record=noise_record)
     if load is not None:
         measured = scan_at_load(measured, load)
     if isinstance(expected, str | PathLike):

@@ -147,6 +147,8 @@ TAKEN_FOR_GRANTED = record(
         )
         for name in STATED_ERRORS
     ),
+    Quantity("averaging_length", _L, "way over which each reading is the mean"),
+    Quantity("dwell_time", "time", "time at each place before its reading"),
     Quantity("position_errors_by_repeat", "truth", "whether x_errors are new in each repeat"),
     Quantity("at_ceiling", _ONE, "number of readings left out at a ceiling"),
     Quantity("reading_high", _U, "end of the range, at which readings are left out"),

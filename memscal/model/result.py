@@ -27,7 +27,7 @@ _IN_A_NOTEBOOK = 100.0
 
 
 class PlotOptions(TypedDict, total=False):
-    """What some figures take: contacts beside it, the name of a figure, what is drawn, or varied."""
+    """What some figures take: contacts beside it, its name, what is drawn, or varied."""
 
     beside: Sequence[Any]
     name: str

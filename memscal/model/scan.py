@@ -40,8 +40,8 @@ LIKE_SIGNAL = ("u_zz_errors", "normal_load", "normal_load_errors", "time")
 LUBRICATIONS = ("", "dry", "lubricated")
 """States of lubrication; empty where a scan states none."""
 
-MOTIONS = ("", "pressed", "sliding")
-"""How an indenter moved; one that states nothing was pressed at each place."""
+MOTIONS = ("", "pressed", "sliding", "rest")
+"""How an indenter moved; one that states nothing was pressed.  A noise record has none: rest."""
 
 STATED_ERRORS = (
     "position_scale",
@@ -73,7 +73,12 @@ def require_rod_friction(friction: float | None) -> None:
 
 
 def require_pressed(motion: str, source: SourceFile | None) -> None:
-    """Refuse the scan of an indenter that slid."""
+    """Refuse the scan of an indenter that slid, and one of none, at rest."""
+    if motion == "rest":
+        raise InputError(
+            f"{source.file_name if source else 'The scan'} is a noise record: nothing was pressed.",
+            cure="Give it beside a scan (noise_record, --noise-record).",
+        )
     if motion == "sliding":
         raise InputError(
             f"{source.file_name if source else 'The scan'} was made with a sliding indenter "
@@ -190,6 +195,8 @@ class ArrayOptions(TypedDict, total=False):
     baseline_curvature_uncertainty: float
     shear_sensitivity_uncertainty: float
     u_zz_correlation: FloatArray
+    averaging_length: float
+    dwell_time: float
 
 
 @keyword_array_record
@@ -238,6 +245,12 @@ class Scan:
         point to point, in N.
     time : ndarray, shape of ``u_zz``, optional
         Time of each reading from the first one, in s; NaN where it is not known.
+    averaging_length : float, optional
+        Way along the scan, in m, over which each reading is the mean, centred on its position.
+    dwell_time : float, optional
+        How long the indenter was held at each place before its reading, in s.
+    noise_record : Scan, optional
+        Readings at rest, whose noise the readings have, in place of a stated one.
     x_errors : ndarray, shape of ``x``, optional
         Standard uncertainty of each position, independent from position to position, in m.
     position_errors_by_repeat : bool
@@ -268,7 +281,8 @@ class Scan:
         Further channels (``u_xz``, ``u_yz``), in V, and where stated their noise
         (``u_xz_errors``, ``u_yz_errors``).
     motion : str
-        ``"pressed"`` at each place, which an empty one stands for, or ``"sliding"``.
+        ``"pressed"`` at each place, which an empty one stands for, or ``"sliding"``; ``"rest"``
+        of a noise record, readings in time with nothing pressed, whose positions are zero.
     lubrication, lubricant : str
         ``"dry"`` or ``"lubricated"``, empty if not stated, and the name of the lubricant.
     title, start_time, end_time, notes : str
@@ -310,6 +324,9 @@ class Scan:
     normal_load: FloatArray | None = None
     normal_load_errors: FloatArray | None = None
     time: FloatArray | None = None
+    averaging_length: float | None = None
+    dwell_time: float | None = None
+    noise_record: Scan | None = None
     x_errors: FloatArray | None = None
     position_errors_by_repeat: bool = False
     u_zz_correlation: FloatArray | None = None
@@ -577,6 +594,8 @@ class Scan:
                 f"{name.replace('_', ' ')} uncertainty of the scan",
                 getattr(self, f"{name}_uncertainty"),
             )
+        require_non_negative("averaging length of the scan", self.averaging_length)
+        require_non_negative("dwell time of the scan", self.dwell_time)
         require_rod_friction(self.rod_friction)
         require_non_negative("standard uncertainty of the load", self.load_uncertainty)
         if self.normal_load_errors is not None and self.normal_load is None:

@@ -15,8 +15,9 @@ from memscal.formats.files import read_bytes
 
 SECTIONS = {
     "table": "x x_unit y u u_unit u_errors noise u_xz u_yz u_sign ceiling repeat branch time "
-    "time_unit speed step holds depth depth_unit baseline baseline_curvature_uncertainty "
-    "line_offset_uncertainty title lab sheet scan skip_rows missing delimiter decimal",
+    "time_unit speed step averaging_length dwell_time holds depth depth_unit baseline "
+    "baseline_curvature_uncertainty line_offset_uncertainty title lab sheet scan skip_rows "
+    "missing delimiter decimal",
     "film": "young_modulus young_modulus_uncertainty poisson_ratio poisson_ratio_uncertainty "
     "thickness thickness_uncertainty film_law mooney_rivlin_ratio base_slip_uncertainty",
     "indenter": "indenter radius radius_uncertainty rod_friction lubrication lubricant",

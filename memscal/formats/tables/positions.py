@@ -12,7 +12,7 @@ from memscal.model.arrays import Columns
 from memscal.model.scan import LINE
 
 
-def require_positions(named: Mapping[str, Any], layout: TableLayout) -> None:
+def require_positions(named: Mapping[str, Any], layout: TableLayout, *, resting: bool) -> None:
     """Refuse a table without positions, or with two kinds of them."""
     columns = named["x"] is not None or named["y"] is not None
     if layout.speed is not None:
@@ -31,6 +31,10 @@ def require_positions(named: Mapping[str, Any], layout: TableLayout) -> None:
                 cure="Name the column that counts them (--x COLUMN) or, of a log with holds "
                 "(--holds), that of the load (--load-column) or depth (--depth) of each press.",
             )
+    elif resting:
+        if columns or named["time"] is None:
+            cure = "Name the columns of time and readings alone (--time, --u)."
+            raise InputError("A noise record is readings in time, at rest.", cure=cure)
     elif not columns:
         cure = "Give x (--x COLUMN), or times (--time COLUMN) and the stage's speed (--speed)."
         raise InputError("No column of the positions is named.", cure=cure)
@@ -63,7 +67,7 @@ def make_positions(
         columns["x"] = layout.step * columns["x"]
         notes.append(f"{counted} are counted, {layout.step * 1e3:.4g} mm apart.")
     elif "x" not in columns:
-        columns["x"] = np.zeros(columns["y"].size)
+        columns["x"] = np.zeros(columns["u_zz"].size)
     return presses
 
 

@@ -290,7 +290,7 @@ def _require_use(
     ):
         if useless:
             raise InputError(problem, cure=cure)
-    require_positions(named, layout)
+    require_positions(named, layout, resting=conditions.motion == "rest")
 
 
 def _wanted(
@@ -396,8 +396,9 @@ def _scan_of(
         columns["normal_load"] = np.full(columns["u_zz"].shape, stated["load"])
     along = direction_of(columns, notes)
     stated["direction"] = conditions.direction or along
-    notes += _counted(columns, table.others)
-    notes += _set_up_in_words({**stated, "load": loads_in_words or stated["load"]})
+    if conditions.motion != "rest":
+        notes += _counted(columns, table.others)
+        notes += _set_up_in_words({**stated, "load": loads_in_words or stated["load"]})
     noise = "not stated"
     if "u_zz_errors" in columns:
         noise = f"{reading.text(np.nanmedian(columns['u_zz_errors']))} (median)"

@@ -88,6 +88,10 @@ class ScanConditions:
         Film and indenter, where both are stated, are held against the positions.
     rod_friction : float, optional
         0 where a rod slides freely under the film, ``inf`` where it sticks.
+    motion : str
+        ``"rest"`` of a noise record: readings in time with nothing pressed, without positions.
+    averaging_length, dwell_time : float, optional
+        Way over which each reading is the mean, in m; time at each place before it, in s.
     lubrication, lubricant : str
         ``"dry"`` or ``"lubricated"``, and the name of the lubricant.
     sensor, load_cell, stage, user
@@ -113,6 +117,9 @@ class ScanConditions:
     indenter: RoundIndenter | None = None
     load: float | None = None
     rod_friction: float | None = None
+    motion: str = ""
+    averaging_length: float | None = None
+    dwell_time: float | None = None
     lubrication: str = ""
     lubricant: str = ""
     sensor: StressSensor = field(default_factory=StressSensor)
