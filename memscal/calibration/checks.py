@@ -25,6 +25,7 @@ from memscal.estimation.residuals import (
     pure_error_test,
     residuals_of,
     ring_test,
+    scatter_of_means,
     steps_test,
 )
 from memscal.estimation.runs import compare_runs, hysteresis_test
@@ -97,8 +98,6 @@ def quality_checks(
     yield from _field_shape(solution, results)
     yield from _set_up(solution)
     yield from _indentation(solution, results, assumed)
-    if estimate.points.u_errors is not None:
-        yield noise_check(estimate.weighed.noise, estimate.points.channel)
     yield from _unexplained(estimate, results)
     yield _bayes_factor(estimate)
     yield _symmetry(estimate)
@@ -374,6 +373,9 @@ def _unexplained(estimate: ProfileEstimate, results: Results) -> _Checks:
     """Test what no G explains: its size against the noise, and its order along the scan."""
     model = free_model(estimate)
     residuals = residuals_of(estimate, model)
+    if residuals.stated:
+        scatter = scatter_of_means(residuals, estimate.weighed.noise)
+        yield noise_check(scatter, estimate.points.channel)
     if residuals.degrees < FEWEST_RESIDUALS:
         return
     outcome: TestOutcome | None

@@ -17,6 +17,7 @@ from memscal.model import checks as quality
 from memscal.model.assumptions import ASSUMED, MOVED, Assumption
 from memscal.model.checks import Message, QualityChecks
 from memscal.model.film import LINEAR, NEO_HOOKEAN, law_in_words
+from memscal.readings.noise_record import record_messages
 
 #: Methods whose window is that of the stress's transform: nothing is left to say of them.
 _WINDOWS = ("white-noise", "tikhonov", "bayesian")
@@ -70,6 +71,8 @@ def calibration_messages(
     if clipped:
         yield Message("at_ceiling", quality.at_ceiling_text(clipped))
     yield from point_messages(estimate)
+    for scan in prepared.as_stated:
+        yield from record_messages(scan)
     if estimate.points.u_errors is None:
         yield _noise(estimate, results)
     yield from _method(solution)

@@ -430,7 +430,7 @@ def _check_usage(path: Path, kind: str, mesh: bool, options: Options) -> None:
         needed += _NEEDED_WITH_MESH if mesh else _TABLE_ONLY
     elif not _stated(options, ("x", "u")) and hook("kind_of_record")(path) == "HDF5 file":
         needed = []  # but what it plots
-    elif _stated(options, ("y", "time", "speed", "step")):
+    elif _stated(options, ("y", "time", "speed", "step", "motion")):
         needed.remove("x")  # the library knows what they need, and says it
     missing = [name for name in needed if options[name] is None]
     if missing:

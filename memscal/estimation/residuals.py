@@ -286,6 +286,20 @@ def neighbour_correlation_test(residuals: Residuals) -> TestOutcome:
     return TestOutcome(value, float(limit), float(p_value))
 
 
+def scatter_of_means(residuals: Residuals, scatter: float) -> float:
+    """Scatter of readings over the stated noise, of means of many where neighbours are alike."""
+    if residuals.degrees < FEWEST_RESIDUALS:
+        return scatter
+    outcome = neighbour_correlation_test(residuals)
+    if outcome.value <= outcome.limit:
+        return scatter
+    values = residuals.values
+    follows = np.diff(residuals.sequence) == 0
+    alike = np.mean((values[1:] * values[:-1])[follows]) / np.mean(values**2)
+    # The variance of a mean of readings of correlation a^|i - j| over that of independent ones.
+    return scatter * math.sqrt((1 + alike) / (1 - alike))
+
+
 def _traces(pairs: csr_array, basis: FloatArray) -> tuple[float, float, float]:
     """Traces of the first three powers of (1 - QQ') W, for a symmetric W without diagonal."""
     squared = pairs.multiply(pairs).sum()

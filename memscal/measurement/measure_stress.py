@@ -32,6 +32,7 @@ from memscal.model.sizes import MOST_OF_CORRELATED_CONTACT
 from memscal.parallel import single_threaded
 from memscal.progress import Listener, Task, reported
 from memscal.readings.mistaken_unit import require_span
+from memscal.readings.noise_record import record_messages
 
 #: Sources of a force's uncertainty that all profiles have in common.
 SHARED_SOURCES = ("apparatus", "film", "position_scale", "load")
@@ -321,6 +322,7 @@ def _profile_messages(
     """Yield the messages of one load; ``noise``: where it was estimated, in V."""
     if noise is not None:
         yield restore.noise_unstated_message(scan.reading.text(float(noise.min())))
+    yield from record_messages(scan)
     if scan.normal_load is not None and scan.normal_load_errors is None:
         yield Message(
             "load_errors_unstated",

@@ -19,7 +19,12 @@ from memscal.estimation.profile import (
     estimate_profile,
     point_messages,
 )
-from memscal.estimation.residuals import FEWEST_RESIDUALS, chi_square_test, residuals_of
+from memscal.estimation.residuals import (
+    FEWEST_RESIDUALS,
+    chi_square_test,
+    residuals_of,
+    scatter_of_means,
+)
 from memscal.estimation.set_up import accepted_differences, file_in_words, stated_differences
 from memscal.formats.opened import opened_scan
 from memscal.formats.reference import read_reference
@@ -50,6 +55,7 @@ from memscal.model.sizes import MOST_OF_CONTACT, too_large
 from memscal.parallel import single_threaded
 from memscal.progress import reported
 from memscal.readings.mistaken_unit import require_span
+from memscal.readings.noise_record import record_messages
 
 #: What tells films apart; the modulus, too, by which a curved indenter's contact grows.
 _FILM = ("young_modulus", "poisson_ratio", "thickness", "law", "mooney_rivlin_ratio", "name")
@@ -279,8 +285,8 @@ def force_less_load(
 def _noise(restored: Restoration) -> Iterator[QualityCheck]:
     if restored.points.u_errors is None:
         return
-    yield noise_check(restored.posterior.found_noise)
     residuals = residuals_of(restored.posterior.estimate)
+    yield noise_check(scatter_of_means(residuals, restored.posterior.found_noise))
     if residuals.degrees >= FEWEST_RESIDUALS:
         size = chi_square_test(residuals)
         yield check(
@@ -318,6 +324,7 @@ def _messages(restored: Restoration, checks: Sequence[QualityCheck]) -> Iterator
     yield from failed_check_messages(checks)
     yield from failed_calibration_messages(restored.apparatus)
     yield from point_messages(restored.posterior.estimate)
+    yield from record_messages(restored.scan)
     if restored.points.u_errors is None:
         yield noise_unstated_message(restored.points.reading.text(restored.noise.min()))
     if not restored.apparatus.radial_profile.g_errors.any():

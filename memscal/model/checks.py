@@ -66,7 +66,7 @@ outliers: share of points with less than half of their weight
 saturation: number of points at a ceiling near the largest voltage (not of a shear)
     lower gain or load, or leave them out (--ceiling)
 noise_as_stated: scatter over the stated noise
-    look for noise of position and load; state the actual noise
+    look for noise of position and load; state the noise, or a noise record
 chi_square: residuals that no radial G, or no radial stress, explains, against the noise
     check reference (rod, film), baseline, stated noise, roundness of a contact
 residual_steps: largest step of the residuals, in standard deviations
@@ -206,9 +206,10 @@ def noise_check(scatter: float, channel: str = "zz") -> QualityCheck:
         "noise_as_stated",
         scatter,
         NOISE_LIMIT,
-        f"Scatter about the fitted profile over the stated u_{channel}_errors. A failure means "
-        "that something besides electronic noise scatters the scan, such as position or load; the "
-        "uncertainties have been raised accordingly.",
+        f"Scatter about the fitted profile over the stated u_{channel}_errors; of means of many "
+        "readings, where neighbours are alike. A failure means that something besides independent "
+        "noise scatters the scan: of position or load, by which the uncertainties have been "
+        "raised, or slow noise, which a noise record states (--noise-record).",
     )
 
 

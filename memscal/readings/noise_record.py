@@ -11,6 +11,7 @@ A record U(t) is taken as white noise and exponentially correlated noise of many
 The variances are the most likely ones by Whittle's likelihood of the tapered periodogram.
 """
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -18,6 +19,7 @@ from scipy.signal import periodogram
 
 from memscal.errors import FitError, InputError
 from memscal.model.arrays import FloatArray, IndexArray, array_record
+from memscal.model.checks import Message
 from memscal.model.notation import Reading
 from memscal.model.scan import Scan
 
@@ -25,14 +27,16 @@ _FEWEST = 64
 #: A step of the times may differ from the others by this share.
 _UNEVEN = 0.1
 #: Correlation times in a decade, and the longest one over the record.
-_PER_DECADE = 3
+_PER_DECADE = 6
 _LONGEST = 3.0
 #: What is correlated over more than this share of the record is drift.
 _DRIFTS = 0.1
 #: The periodogram is averaged over so many bins of frequency, without its first lines.
 _BINS = 400
 _FIRST_LINE = 2
-_ROUNDS = 500
+_ROUNDS = 100
+#: A further correlation time raises the log-likelihood by so much, or is left out.
+_CLEARLY = 4.0
 #: Readings that are less correlated are taken as independent.
 _INDEPENDENT = 1e-3
 
@@ -119,25 +123,54 @@ def noise_of(record: Scan) -> NoiseRecord:
 
 
 def _most_likely(power: FloatArray, densities: FloatArray) -> FloatArray:
-    """Return the variances, (m,), whose sum of densities (f, m) has the most likely periodogram."""
-    # By multiplicative rounds of the Itakura-Saito divergence (Fevotte and Idier, Neural Comput.
-    # 23, 2011, Eq. 4.1), which are Whittle's likelihood, over bins of frequency.
+    """Return the variances, (m,), by which few of the densities (f, m) make the periodogram."""
     edges = np.unique(np.geomspace(1, power.size, _BINS).astype(int)) - 1
     counts = np.diff(edges, append=power.size)
     found = _means(power, edges, counts)
-    shape = _means(densities.T, edges, counts).T
-    variances = np.full(shape.shape[1], found.mean() / shape.mean() / shape.shape[1])
+    shapes = _means(densities.T, edges, counts).T
+    # White noise, then whichever makes the record more likely, while it does so clearly: many
+    # at once would follow the scatter of the few lowest lines.
+    chosen = [0]
+    variances, least = _fitted(found, shapes[:, chosen], counts)
+    while len(chosen) < shapes.shape[1]:
+        others = [i for i in range(shapes.shape[1]) if i not in chosen]
+        tried = [_fitted(found, shapes[:, [*chosen, i]], counts) for i in others]
+        best = int(np.argmin([loss for _, loss in tried]))
+        if least - tried[best][1] < _CLEARLY:
+            break
+        chosen.append(others[best])
+        variances, least = tried[best]
+    every = np.zeros(shapes.shape[1])
+    every[chosen] = variances
+    return every
+
+
+def _fitted(found: FloatArray, shapes: FloatArray, counts: IndexArray) -> tuple[FloatArray, float]:
+    """Return the most likely variances of densities, and their loss of Whittle's likelihood."""
+    # By multiplicative rounds (Fevotte and Idier, Neural Comput. 23, 2011, Eq. 4.1).
+    variances = found.mean() / shapes.mean(axis=0) / shapes.shape[1]
     for _ in range(_ROUNDS):
-        fitted = shape @ variances
-        rise = (counts * found / fitted**2) @ shape
-        fall = (counts / fitted) @ shape
-        variances = variances * np.sqrt(rise / fall)
-    return np.asarray(variances)
+        fitted = shapes @ variances
+        rise = (counts * found / fitted**2) @ shapes
+        variances = variances * rise / ((counts / fitted) @ shapes)
+    fitted = shapes @ variances
+    return variances, float(counts @ (found / fitted + np.log(fitted)))
 
 
 def _means(values: FloatArray, edges: IndexArray, counts: IndexArray) -> FloatArray:
     """Return means along the last axis, of bins from edges."""
     return np.asarray(np.add.reduceat(values, edges, axis=-1) / counts)
+
+
+def record_messages(scan: Scan) -> Iterator[Message]:
+    """Say from which record the noise of a scan is."""
+    record = scan.noise_record
+    if record is not None:
+        named = "a record at rest that travels with the scan"
+        if record.source:
+            named = f"{record.source.file_name} (sha256 {record.source.sha256})"
+        text = f"Size and correlation of the noise are those of {named}."
+        yield Message("noise_record", text, "note")
 
 
 def with_recorded_noise(scan: Scan) -> Scan:
