@@ -27,6 +27,8 @@ from .extensions.monte_carlo.sweep import Sweep as Sweep
 from .extensions.planning.design import Design as Design
 from .extensions.planning.design import Plan as Plan
 from .extensions.planning.design import design as design
+from .extensions.response.response import Response as Response
+from .extensions.response.response import response as response
 from .extensions.simulation.disturbances import Disturbances as Disturbances
 from .extensions.simulation.experiment import Experiment as Experiment
 from .extensions.simulation.experiment import simulate_experiment as simulate_experiment

@@ -18,6 +18,7 @@ NOT_PUBLIC = {
     "Holds",
     "InputEffect",
     "LawComparison",
+    "NoiseSpectrum",
     "OtherEstimate",
     "Posterior",
     "Reading",
@@ -25,6 +26,7 @@ NOT_PUBLIC = {
     "SetUp",
     "Solution",
     "StressComparison",
+    "Wave",
 }
 """Types of what results hold that no user constructs, and of how a result was computed."""
 

@@ -79,6 +79,7 @@ def assemble(
         ),
         budget=results.budget,
         kernel_changes=results.kernel_changes,
+        shared_effects=results.shared_effects,
         assumptions=assumptions,
         **common_circumstances(solution.scans),
         other=other_estimate,

@@ -42,7 +42,7 @@ from memscal.estimation.reference_spectra import (
 from memscal.estimation.smoothing import SmoothedProfile
 from memscal.estimation.voltage_map import DENSE, VoltageMap, square_root, triangular
 from memscal.mechanics.contact import BaseStress
-from memscal.model.apparatus import ParameterSet
+from memscal.model.apparatus import ParameterSet, round_wavenumbers
 from memscal.model.arrays import TINY, Arrays, FloatArray, array_record, slices
 from memscal.model.assumptions import MOVED
 from memscal.model.scan import STATED_ERRORS, Scan
@@ -224,6 +224,7 @@ class Results:
     effective_degrees: Mapping[str, float]  # by parameter, where noise is estimated
     # (n,) by input, where none are correlated: of A G(r) over A by one uncertainty, in 1/m^2
     kernel_changes: Arrays
+    shared_effects: Arrays  # (2 + m,) by source, likewise: of ln A, ln sigma and ln(A G)
     division: DivisionMap | None = None  # that was propagated
     field_errors: FloatArray | None = None  # (m, n): of a raster's G over the plane, in 1/m^2
 
@@ -313,6 +314,9 @@ def propagate(
     for source in effects if not correlations else ():
         change = columns[source][:stop, 0]
         kernel_changes[source] = change[count:] + g_over_a * change[0]
+    shared: Arrays = {}
+    if not correlations:
+        shared = _shared_effects(solution, deconvolution, names, columns)
     return Results(
         parameters=ParameterSet(names, values, stored[:count, :count]),
         changes={source: columns[source][:count, 0] for source in effects},
@@ -324,8 +328,29 @@ def propagate(
         by_voltage=by_voltage[:count],
         effective_degrees=_effective_degrees(estimate, names, columns["noise"], stored),
         kernel_changes=kernel_changes,
+        shared_effects=shared,
         division=division,
     )
+
+
+def _shared_effects(
+    solution: Solution, deconvolution: Deconvolution, names: Sequence[str], columns: Arrays
+) -> Arrays:
+    """Changes of ln A, ln sigma and ln(A G) by each source; of several columns their norm."""
+    g = deconvolution.g
+    k = round_wavenumbers(solution.band.resolved)
+    transform = bessel_table(k, g.r) * ring_areas(g.r)
+    transfer = transform @ g.radial
+    a, sigma = (names.index(name) for name in MOVED[:2])
+    effects = {}
+    for source, column in columns.items():
+        of_a = column[a] / deconvolution.conversion_constant
+        of_sigma = column[sigma] / solution.estimate.gaussian.sigma
+        of_g = transform @ column[len(names) : len(names) + g.r.size] / transfer[:, None]
+        changes = np.vstack([of_a, of_sigma, of_a + of_g])
+        signed = changes.shape[1] == 1
+        effects[source] = changes[:, 0] if signed else np.linalg.norm(changes, axis=1)
+    return effects
 
 
 def _effective_degrees(

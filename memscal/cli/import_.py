@@ -5,6 +5,7 @@ from __future__ import annotations
 import shlex
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
+from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -99,6 +100,21 @@ def _take_recipe(context: click.Context, _: click.Parameter, path: Path | None) 
         hook("read_recipe")(context, path)
 
 
+class _Time(click.ParamType):  # type: ignore[type-arg]
+    """A date or a time of ISO 8601, which stays text."""
+
+    name = "time"
+
+    def convert(self, value: str, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        """Refuse what is no date."""
+        try:
+            datetime.fromisoformat(value)
+        except ValueError:
+            self.fail(f"{value!r} is no date or time such as 2026-11-20T09:30:00.", param, ctx)
+        return value
+
+
+_INDENTER = ("indenter", "radius", "radius_uncertainty", "rod_friction", "indenter_name")
 _CELL_NAMES = {"name": "load_cell", "serial_number": "load_cell_serial"}
 _SENSOR_NAMES = {"name": "sensor_name", "model": "sensor_model", "channel": "channel"}
 _SIGNS = ("u_sign", "sign", "shear_sign")
@@ -276,6 +292,7 @@ _NAMED = 12
 )
 @option("--load-cell-serial", "TEXT")("Scan: serial number of the load cell.")
 @option("--title", "TEXT")("Scan: title.")
+@option("--start-time", _Time())("Scan: when it began, 2026-11-20 or 2026-11-20T09:30:00+01:00.")
 @laboratory_option("Scan: ")
 @option("--r", "COLUMN")("Reference: column of the radius.")
 @option("--r-unit", "UNIT")(
@@ -309,7 +326,13 @@ _NAMED = 12
 )
 @option("--indenter", click.Choice(["rod", "sphere"]))("Shape of the indenter.  [default: rod]")
 @radius_options("the rod or of the sphere's curvature")
+@option("--indenter-name", "TEXT")(
+    "Scan: name of the indenter; calibrations by the same one share the error of its radius."
+)
 @film_options()
+@option("--film-name", "TEXT")(
+    "Scan: name of the film; calibrations through the same one share what is not known of it."
+)
 @rod_friction_option(FREE_OR_STUCK)
 @option("--sheet", "NAME")("Sheet of a workbook.  [default: the first that is visible]")
 @option("--scan", click.IntRange(1), metavar="N")(
@@ -495,9 +518,9 @@ _UNKNOWN = (
 
 def _set_up(options: Options) -> dict[str, Any]:
     stated: dict[str, Any] = {}
-    if _stated(options, (*FILM_NUMBERS, *LAW)):
+    if _stated(options, (*FILM_NUMBERS, *LAW, "film_name")):
         stated["film"] = film_from(options, _UNKNOWN)
-    if _stated(options, ("indenter", "radius", "radius_uncertainty", "rod_friction")):
+    if _stated(options, _INDENTER):
         stated["indenter"] = indenter_from(options["indenter"] or "rod", options)
     return stated
 

@@ -315,7 +315,8 @@ def film_from(options: Options, otherwise: str = "") -> ElasticFilm:
     from memscal.model.film import ElasticFilm
 
     numbers: Options = {name: options.get(name) for name in FILM_NUMBERS}
-    return ElasticFilm(law=law, mooney_rivlin_ratio=ratio, **numbers)
+    name = options.get("film_name") or ""
+    return ElasticFilm(law=law, mooney_rivlin_ratio=ratio, name=name, **numbers)
 
 
 def indenter_from(shape: str, options: Options) -> RoundIndenter:
@@ -325,7 +326,8 @@ def indenter_from(shape: str, options: Options) -> RoundIndenter:
 
     kind = {"rod": Rod, "sphere": Sphere}[shape]
     spread = options.get("radius_uncertainty")
-    return kind(radius=options["radius"], radius_uncertainty=spread)
+    name = options.get("indenter_name") or ""
+    return kind(radius=options["radius"], radius_uncertainty=spread, name=name)
 
 
 def named(names: Iterable[str]) -> str:

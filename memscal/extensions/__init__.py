@@ -30,6 +30,10 @@ COMMANDS = {
         "extensions.planning.command",
         "Predict the uncertainties of a scan before it is made.",
     ),
+    "response": (
+        "extensions.response.command",
+        "Find which waves of pressure a sensor resolves, and how small ones.",
+    ),
     "simulate": (
         "extensions.simulation.command",
         "Make a synthetic scan, or the scans of an experiment.",
@@ -57,6 +61,10 @@ VIEWS = {
         "extensions.interface_laws.figure.interface_figure",
     ),
     "MonteCarlo": ("extensions.monte_carlo.summary", ""),
+    "Response": (
+        "extensions.response.summary",
+        "extensions.response.figure.response_figure",
+    ),
     "Sweep": (
         "extensions.monte_carlo.sweep_summary",
         "extensions.monte_carlo.sweep_figure.sweep_figure",
@@ -102,6 +110,7 @@ PUBLIC = {
     "extensions.monte_carlo.monte_carlo": ["MonteCarlo", "monte_carlo"],
     "extensions.monte_carlo.sweep": ["Sweep"],
     "extensions.planning.design": ["Design", "Plan", "design"],
+    "extensions.response.response": ["Response", "response"],
     "extensions.simulation.disturbances": ["Disturbances"],
     "extensions.simulation.experiment": ["Experiment", "simulate_experiment"],
     "extensions.simulation.rod_scan": ["simulate"],

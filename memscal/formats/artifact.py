@@ -1,5 +1,6 @@
 """memscal-artifact: the apparatus function with all that it rests on, as HDF5."""
 
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -20,6 +21,7 @@ from memscal.model.apparatus import (
     OtherEstimate,
     Reconvolution,
     TransferFunction,
+    round_wavenumbers,
 )
 from memscal.model.arrays import Arrays
 from memscal.model.notation import Reading
@@ -27,6 +29,7 @@ from memscal.model.notation import Reading
 #: A compact artifact has none.
 _PLANE = "/entry/apparatus_function"
 _CHANGES = "/entry/kernel_changes"
+_EFFECTS = "/entry/shared_effects"
 
 
 def artifact_from(file: SafeFile) -> ApparatusData:
@@ -59,6 +62,7 @@ def artifact_from(file: SafeFile) -> ApparatusData:
         reference=groups.read_profile(file, load=load),
         process=process,
         kernel_changes=_read_changes(file),
+        shared_effects=_read_effects(file),
         assumptions=groups.read_assumptions(file),
         other=_read_other(file, reading),
     )
@@ -95,9 +99,13 @@ def artifact_tree(data: ApparatusData) -> Group:
         stated = {"kernel_changes": np.stack(list(data.kernel_changes.values()))}
         radii = si(data.radial_profile.r, "length", ("r",))
         group = write_record(records.KERNEL_CHANGES, stated, r=radii)
-        names = to_json(list(data.kernel_changes))
-        group = replace(group, children={"names": names, **group.children})
-        children["kernel_changes"] = group
+        children["kernel_changes"] = _with_names(group, data.kernel_changes)
+    if data.shared_effects:
+        table = np.stack(list(data.shared_effects.values()))
+        changes = {"of_a": table[:, 0], "of_sigma": table[:, 1], "of_transfer": table[:, 2:]}
+        k = round_wavenumbers(data.resolved_wavenumber)
+        group = write_record(records.SHARED_EFFECTS, {"k": k, **changes})
+        children["shared_effects"] = _with_names(group, data.shared_effects)
     if data.other is not None:
         name = "bayesian" if data.other.method == "bayesian" else "division"
         radial = data.other.radial_profile
@@ -111,6 +119,20 @@ def artifact_tree(data: ApparatusData) -> Group:
         default = "apparatus_function"
         children[default] = write_record(records.FIELD, data.plane)
     return file_tree(ARTIFACT_SCHEMA, Group("NXentry", children, {"default": default}))
+
+
+def _with_names(group: Group, names: Iterable[str]) -> Group:
+    return replace(group, children={"names": to_json(list(names)), **group.children})
+
+
+def _read_effects(file: SafeFile) -> Arrays:
+    """Read what calibrations share, which artifacts before version 1.2 do not state."""
+    names = file.text_list(f"{_EFFECTS}/names")
+    if not names:
+        return {}
+    read = read_record(records.SHARED_EFFECTS, file, _EFFECTS, sizes={"source": len(names)})
+    table = np.column_stack([read["of_a"], read["of_sigma"], read["of_transfer"]])
+    return dict(zip(names, table, strict=True))
 
 
 def _read_changes(file: SafeFile) -> Arrays:

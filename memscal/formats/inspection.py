@@ -62,6 +62,7 @@ _LAYOUTS: dict[str, dict[str, Record]] = {
         "/entry/radial_profile": records.RADIAL_VERSION_1_0,
         "/entry/radial_covariance": records.RADIAL_COVARIANCE,
         "/entry/kernel_changes": records.KERNEL_CHANGES,
+        "/entry/shared_effects": records.SHARED_EFFECTS,
         "/entry/radial_profile_bayesian": records.RADIAL,
         "/entry/radial_profile_division": records.RADIAL,
         "/entry/transfer_function": records.TRANSFER,

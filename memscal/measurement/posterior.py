@@ -445,7 +445,7 @@ def shared_changes(
     """
     known = apparatus.film
     names = list[str]()
-    if known is not None and all(scan.film and _alike(scan.film, known) for scan in scans):
+    if known is not None and all(scan.film and alike_films(scan.film, known) for scan in scans):
         names += _FILM_PROPERTIES
     if all(scan.load_cell.same_as(apparatus.load_cell) for scan in scans):
         names.append("load")
@@ -480,7 +480,7 @@ def common_inputs(apparatus: ApparatusFunction, other: ApparatusFunction) -> lis
     return [name for name in apparatus.kernel_changes if name in other.kernel_changes]
 
 
-def _alike(film: ElasticFilm, other: ElasticFilm) -> bool:
+def alike_films(film: ElasticFilm, other: ElasticFilm) -> bool:
     """Whether two films state the same properties and uncertainties."""
     names = [*_FILM_PROPERTIES, *(f"{name}_uncertainty" for name in _FILM_PROPERTIES)]
     # What is not stated is not a number.

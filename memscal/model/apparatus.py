@@ -20,6 +20,15 @@ from memscal.model.notation import VOLTS, Reading, format_measured
 from memscal.model.provenance import Process
 from memscal.model.stress import StressProfile
 
+#: Wavenumbers of a decade; some of the one before.
+_ROUND = np.array([0.1, 0.2, 0.5, 1.0, 2.0, 5.0])
+
+
+def round_wavenumbers(resolved: float) -> FloatArray:
+    """Return up to three resolved wavenumbers, in rad/m, that calibrations of a sensor share."""
+    k = 10.0 ** np.floor(np.log10(resolved)) * _ROUND
+    return np.asarray(k[k <= resolved][-3:])
+
 
 @array_record
 class ApparatusField(FrozenArrays):
@@ -221,8 +230,12 @@ class ApparatusData(Checked):
     ``reference`` is the base stress that was divided by; ``budget`` has the standard uncertainty
     of the conversion constant and of both Gaussian widths by source; ``kernel_changes`` (n,), at
     the radii of ``radial_profile``, are those of A G over A by one standard uncertainty of each
-    input, in 1/m^2, empty where inputs are correlated; ``assumptions`` are what the result takes
-    for granted; ``other`` is the estimate by the route that was not chosen, where there is one.
+    input, in 1/m^2, empty where inputs are correlated; ``shared_effects`` (2 + m,),
+    likewise, and by noise and regularisation, whose sign is not known, are those of ln A, of the
+    logarithm of the Gaussian width, and of ln A G(k) at the m ``round_wavenumbers``, as
+    calibrations with the same film, rod or load cell share them; ``assumptions`` are what the
+    result takes for granted; ``other`` is the estimate by the route that was not chosen, where
+    there is one.
     """
 
     plane: ApparatusField | None
@@ -239,6 +252,7 @@ class ApparatusData(Checked):
     process: Process
     budget: Mapping[str, Mapping[str, float]]
     kernel_changes: Mapping[str, FloatArray] = dataclass_field(default_factory=dict)
+    shared_effects: Mapping[str, FloatArray] = dataclass_field(default_factory=dict)
     assumptions: tuple[Assumption, ...] = ()
     other: OtherEstimate | None = None
     load_cell: LoadCell = dataclass_field(default_factory=LoadCell)

@@ -52,6 +52,9 @@ class RoundIndenter(Indenter):
     radius, radius_uncertainty : float
         Radius of the rod or of the sphere's curvature, and its standard uncertainty (k = 1), in m;
         ``None`` means "not stated".
+    name : str
+        Which indenter it is, where there are several: calibrations with the same one share the
+        error of its radius.
 
     Examples
     --------
@@ -64,6 +67,7 @@ class RoundIndenter(Indenter):
 
     radius: float
     radius_uncertainty: float | None = None
+    name: str = ""
 
     def __post_init__(self) -> None:
         require_positive(f"{self.shape} radius", self.radius, "m")

@@ -45,6 +45,7 @@ DIMENSIONS = {
     "energy": Dimension("J", "J", "J"),
     "temperature": Dimension("K", "K", "K"),
     "time": Dimension("s", "s", "s"),
+    "frequency": Dimension("Hz", "Hz", "Hz"),
     "stress per length": Dimension("Pa/m", "MPa/mm", "MPa/mm", 1e9),
 }
 

@@ -35,7 +35,8 @@ FILM = record(
 )
 
 _RADIUS = measured(Quantity("radius", _L, "radius", "R", required=True))
-ROUND_INDENTER = record("NXcollection", *_RADIUS)
+_INDENTER_NAME = Quantity("name", "text", "name of the indenter", origin="indenter")
+ROUND_INDENTER = record("NXcollection", *_RADIUS, _INDENTER_NAME)
 _SLOPE = Quantity("inclination", "angle", "inclination of the face", required=True)
 CONE = record("NXcollection", _SLOPE)
 INDENTER_FACE = record(
@@ -56,6 +57,7 @@ INDENTER = record(
     "NXcollection",
     Quantity("shape", "text", "shape of the indenter", required=True),
     *_RADIUS,
+    _INDENTER_NAME,
     _SLOPE,
     *LOAD.quantities,
 )
@@ -253,6 +255,17 @@ KERNEL_CHANGES = record(
     signal="changes",
 )
 """Changes of A G over A by one standard uncertainty of each input, in the order of names."""
+SHARED_EFFECTS = record(
+    "NXdata",
+    *required(
+        Quantity("k", _W, "wavenumber", "k", ("k",)),
+        Quantity("of_a", _ONE, "change of ln A", axes=("source",)),
+        Quantity("of_sigma", _ONE, "change of ln sigma", axes=("source",)),
+        Quantity("of_transfer", _ONE, "change of ln(A G(k))", axes=("source", "k")),
+    ),
+    signal="of_transfer",
+)
+"""Signed effects of one standard uncertainty of each source, in the order of names."""
 RADIAL_VERSION_1_0 = record("NXdata", *_G[:4], *_COVARIANCE[1:], _G[4], signal="g")
 """The radial profile in files of version 1.0, which held its covariance."""
 TRANSFER = record(

@@ -11,10 +11,12 @@ from helpers.scans import LINEAR_FILM, RING, SIGMA, TAILS, simulate, simulated
 from scipy.stats import binom
 
 import memscal
+from memscal.axisymmetry.hankel import hankel_transform
 from memscal.axisymmetry.kernels import unit_gaussian
 from memscal.deconvolution.division import WhiteNoise
 from memscal.deconvolution.widths import kernel_functionals
 from memscal.extensions.simulation.rod_scan import PAPER_ROD
+from memscal.model.apparatus import round_wavenumbers
 
 PARAMETERS = ("conversion_constant", "gaussian_sigma", "gaussian_sigma_deconvolved")
 
@@ -175,13 +177,26 @@ def test_kernel_changes_are_those_of_calibrations_with_another_film():
     film = scan.set_up.film
     u = film.thickness_uncertainty or 0.0
     kernels = []
+    logarithms = []
+    k = round_wavenumbers(found.resolved_wavenumber)
     for thickness in (film.thickness + u, film.thickness - u):
         other = replace(scan, film=replace(film, thickness=thickness))
         of_other = memscal.calibrate(other, method="evidence").apparatus
         g = np.interp(found.radial_profile.r, of_other.radial_profile.r, of_other.radial_profile.g)
         kernels.append(of_other.conversion_constant / found.conversion_constant * g)
+        transfer = hankel_transform(of_other.radial_profile.r, of_other.radial_profile.g, k)
+        numbers = [of_other.gaussian_sigma, *(of_other.conversion_constant * transfer)]
+        logarithms.append(np.log(numbers))
     difference = (kernels[0] - kernels[1]) / 2
     apart = found.kernel_changes["thickness"] - difference
     assert np.linalg.norm(apart) < 0.05 * np.linalg.norm(difference)
+    assert found.shared_effects["thickness"][1:] == pytest.approx(
+        (logarithms[0] - logarithms[1]) / 2, rel=0.1
+    )
+    budget = found.budget["conversion_constant"]
+    shares = {source: abs(found.shared_effects[source][0]) for source in budget}
+    assert shares == pytest.approx({s: u / found.conversion_constant for s, u in budget.items()})
     between = {("thickness", "poisson_ratio"): 0.5}
-    assert not memscal.calibrate(scan, correlations=between).apparatus.kernel_changes
+    correlated = memscal.calibrate(scan, correlations=between).apparatus
+    assert not correlated.kernel_changes
+    assert not correlated.shared_effects

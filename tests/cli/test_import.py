@@ -80,3 +80,20 @@ def test_a_refusal_shows_the_command_for_the_own_table(run, folder):
     run(*moved).exits(2, "memscal import 'my log.csv' --u Signal -o")
     refusal = run("batch", "my log.csv", "-o", "results").exits(3, "recipe").err
     assert str(folder) not in refusal
+
+
+def test_film_indenter_and_time_are_named_by_options_or_by_the_laboratory(run, folder):
+    write_log("F [N]")
+    names = ["--film-name", "F7", "--indenter-name", "R2", "--start-time", "2026-11-20T09:30:00Z"]
+    made = ("import", "log.csv", "-o", "scan.h5", *OPTIONS.split())
+    run(*made, *names).exits(0)
+    scan = memscal.read_scan("scan.h5")
+    assert (scan.film.name, scan.indenter.name) == ("F7", "R2")
+    assert scan.start_time == "2026-11-20T09:30:00Z"
+    run(*made, "--start-time", "20.11.2026", "--force").exits(2, "20.11.2026")
+    lab = "film.name = 'F8'\nindenter.name = 'R3'\nconditions.start_time = 2026-11-21\n"
+    (folder / "lab.toml").write_text(lab, encoding="utf-8")
+    run(*made, "--lab", "lab.toml", "--force").exits(0)
+    scan = memscal.read_scan("scan.h5")
+    assert (scan.film.name, scan.indenter.name, scan.start_time) == ("F8", "R3", "2026-11-21")
+    run(*made, *names, "--lab", "lab.toml", "--force").exits(3, "lab.toml")

@@ -23,6 +23,13 @@ OF_A_COMPARISON = ["", *figure_stems(STATES[:1], interface=True)]
 WITHOUT_UNCERTAINTIES = {"contacts", "sweep", "fleet"}
 
 
+class White:
+    corner = 0.5
+
+    def spectral_density(self, frequency):
+        return np.full_like(frequency, 1e-13)
+
+
 @cache
 def compared():
     return comparison(lubrications=STATES, interface=interface_comparison())
@@ -56,6 +63,9 @@ FIGURES = {
     ).plot(),
     "contacts": lambda _: contacts()[0].plot(beside=contacts()[1:]),
     "design": lambda _: memscal.design(step=0.5e-3, repeats=2).plot(),
+    "response": lambda _: memscal.response(
+        known_apparatus(), 4e-3, 1e-3, noise_record=White(), length=50e-3
+    ).plot(),
     "sweep": lambda _: make_sweep().plot(),
     "fleet": lambda _: fleet().plot(),
     "laws": lambda _: interface_comparison().plot(),

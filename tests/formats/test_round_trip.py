@@ -110,8 +110,10 @@ def test_a_reference_in_a_scan_without_parameters_takes_its_load_but_no_film():
 
 
 def test_an_artifact_comes_back():
-    found = kept()
-    assert_same(found, make_artifact(), but=("source", "units"))
+    changes = np.array([-0.01, 0.02, -0.011, -0.012, -0.013])
+    effects = {"noise": np.abs(changes), "load": changes}
+    found = kept(shared_effects=effects)
+    assert_same(found, make_artifact(shared_effects=effects), but=("source", "units"))
     assert found.parameters.units == ("V/Pa", "m", "m", "m", "V")
 
 

@@ -69,6 +69,7 @@ DEFINITIONS: Mapping[str, tuple[str, Mapping[str, Record], tuple[str, ...]]] = {
             "radial_profile": records.RADIAL,
             "radial_covariance": records.RADIAL_COVARIANCE,
             "kernel_changes": records.KERNEL_CHANGES,
+            "shared_effects": records.SHARED_EFFECTS,
             "transfer_function": records.TRANSFER,
             "reconvolution": records.RECONVOLUTION,
             "parameters": _ANYTHING,
@@ -167,7 +168,7 @@ def _group(made: dict[str | None, ET.Element], path: str, of: Record, *, needed:
         _quantity(group, quantity, optional=some or not quantity.required)
     if of.nx_class in ("NXsample", "NXsensor", "NXpositioner"):
         _field(group, "depends_on", "NX_CHAR")
-    if of is records.KERNEL_CHANGES:
+    if of in (records.KERNEL_CHANGES, records.SHARED_EFFECTS):
         _field(group, "names", "NX_CHAR")
     if of is _NOTE:
         _field(group, "data", "NX_CHAR")

@@ -27,6 +27,8 @@ Section = Mapping[str, Any]
 
 RULES = ("simple acceptance", "guarded acceptance")
 """Decision rules: whether a value must lie within its tolerance, or clear of its limits."""
+THINGS = ("film", "indenter")
+"""What a scan or an artifact may hold, by the sections that name it."""
 KINDS = {"load cell": "load_cell", "stage": "stage"}
 """Kinds of equipment that scans and artifacts carry, with their attributes there."""
 MEASURED_BY = {
@@ -48,6 +50,8 @@ _KEYS = {
     "customer": f"name* {_ADDRESS}",
     "person": "name* role* operator",
     "sensor": "name* model manufacturer* serial*",
+    "film": "name",
+    "indenter": "name",
     "equipment": "name* kind:kind serial* certificate* date*:date",
     "conditions": "temperature*:temperature humidity*:dimensionless start_time*:time end_time:time",
     "certificate": "language:language place received:date condition deviations remarks replaces",
@@ -113,6 +117,9 @@ class LaboratoryFile:
         operator = self.stated("person", "operator")
         user = {"name": operator, "affiliation": self.stated("laboratory", "name")}
         parts = {"sensor": sensor, "user": user}
+        for thing in THINGS:
+            if getattr(holder, thing) is not None:
+                parts[thing] = dict(self.sections.get(thing, {}))
         for kind, attribute in KINDS.items():
             found = [item for item in self.equipment if item.get("kind") == kind]
             parts[attribute] = {k: v for k, v in found[0].items() if k != "kind"} if found else {}
@@ -163,7 +170,7 @@ def read_laboratory(path: FilePath) -> LaboratoryFile:
     for kind in KINDS:
         if sum(item.get("kind") == kind for item in listed) > 1:
             raise FormatError(f"{name} has more than one {kind}.", cure="Leave all but one out.")
-    known = [*NEEDED, "certificate", "decision", "uncertainties"]
+    known = [*NEEDED, "certificate", "decision", "uncertainties", *THINGS]
     for section in content:
         _require_known(name, section, known)
     sections = {key: _section(f"{name}: [{key}]", key, item) for key, item in content.items()}

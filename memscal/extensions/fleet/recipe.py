@@ -16,11 +16,12 @@ from memscal.formats.files import read_bytes
 SECTIONS = {
     "table": "x x_unit y u u_unit u_errors noise u_xz u_yz u_sign ceiling repeat branch time "
     "time_unit speed step averaging_length dwell_time holds depth depth_unit baseline "
-    "baseline_curvature_uncertainty line_offset_uncertainty title lab sheet scan skip_rows "
-    "missing delimiter decimal",
+    "baseline_curvature_uncertainty line_offset_uncertainty title start_time lab sheet scan "
+    "skip_rows missing delimiter decimal",
     "film": "young_modulus young_modulus_uncertainty poisson_ratio poisson_ratio_uncertainty "
-    "thickness thickness_uncertainty film_law mooney_rivlin_ratio base_slip_uncertainty",
-    "indenter": "indenter radius radius_uncertainty rod_friction lubrication lubricant",
+    "thickness thickness_uncertainty film_law mooney_rivlin_ratio base_slip_uncertainty film_name",
+    "indenter": "indenter indenter_name radius radius_uncertainty rod_friction lubrication "
+    "lubricant",
     "load": "load load_column load_unit load_uncertainty load_scatter",
     "sensor": "sensor_name sensor_model channel name_pattern die_pitch gain_uncertainty "
     "gain_curvature_uncertainty roundness_uncertainty shear_sensitivity_uncertainty",

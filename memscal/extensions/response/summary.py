@@ -1,0 +1,76 @@
+"""The response of a sensor as tables and mapping, as ``memscal response`` prints it."""
+
+import math
+
+import numpy as np
+
+from memscal.extensions.response.response import Response, Wave
+from memscal.model.arrays import Values
+from memscal.model.quantities import MM, Quantity, measured
+from memscal.summaries.declared import cell, members
+from memscal.summaries.table import Table
+
+_NOT_RESOLVED = "not resolved"
+
+
+def _quantities(seen: Response) -> tuple[Quantity, ...]:
+    gain = Quantity("gain", "voltage per stress", "gain").read_in(seen.apparatus.reading)
+    return (
+        Quantity("wavelength", "length", "wavelength"),
+        *measured(gain),
+        Quantity("phase", "angle", "phase"),
+        Quantity("frequency", "frequency", "frequency"),
+        Quantity("smallest_stress", "stress", "smallest stress", shown="Pa"),
+    )
+
+
+def mapping(seen: Response) -> Values:
+    """Return the object of ``response --json``."""
+    declared = _quantities(seen)
+    waves = []
+    for wave in seen.waves:
+        values = members(declared, wave) | {"resolved": wave.resolved}
+        if not wave.resolved:
+            values["gain"] = None
+        waves.append(values)
+    return {"waves": waves}
+
+
+def answer(seen: Response) -> str:
+    """Return which waves are resolved, and from which speed on drift does not rule."""
+    shortest = 2 * math.pi / seen.apparatus.resolved_wavenumber
+    lines = [
+        f"Under a film of {seen.film.thickness / MM:.4g} mm the calibration resolves waves of "
+    ]
+    lines[0] += f"{shortest / MM:.3g} mm or longer."
+    noise = seen.noise_record
+    if noise is not None and np.any(seen.frequency < noise.corner):
+        lines.append(
+            f"Below {noise.corner:.3g} Hz drift rules the noise: move faster, or state a baseline."
+        )
+    return "\n".join(lines)
+
+
+def tables(seen: Response) -> list[Table]:
+    """Return one row for each wave, with what is known of it."""
+    head = ["wavelength (mm)", "gain", "phase (rad)"]
+    timed = seen.speed is not None
+    heard = seen.noise_record is not None
+    head += ["frequency (Hz)"] * timed + ["smallest stress (Pa)"] * heard
+    rows = []
+    for wave in seen.waves:
+        row = [f"{wave.wavelength / MM:.4g}", *_gain_cells(seen, wave)]
+        row += [f"{wave.frequency:.4g}"] * timed
+        row += [f"{wave.smallest_stress:.3g}" if wave.resolved else "-"] * heard
+        rows.append(row)
+    title = "Reading per pressure of a wave (± standard uncertainty, k = 1)"
+    if seen.friction:
+        title += f", with a shear of {seen.friction:.4g} times the pressure"
+    return [Table(title, head, rows)]
+
+
+def _gain_cells(seen: Response, wave: Wave) -> list[str]:
+    if not wave.resolved:
+        return [_NOT_RESOLVED, "-"]
+    gain = _quantities(seen)[1]
+    return [cell(gain, wave), f"{wave.phase:.3f}"]
