@@ -263,7 +263,7 @@ def _noise_at_rest(record: NoiseSpectrum | Scan | str | PathLike[str]) -> NoiseS
     if isinstance(record, str | PathLike):
         record = read_scan(record)
     if isinstance(record, Scan):
-        record = noise_of(record)
+        return noise_of(record)
     if not isinstance(record, NoiseSpectrum):
         raise InputError(
             f"{type(record).__name__} is given where a noise record is needed.",
