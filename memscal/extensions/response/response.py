@@ -51,7 +51,10 @@ ComplexArray = NDArray[np.complex128]
 class NoiseSpectrum(Protocol):
     """What is known of the noise of a sensor at rest."""
 
-    corner: float  # frequency below which drift rules, in Hz
+    @property
+    def corner(self) -> float:
+        """Frequency below which drift rules, in Hz."""
+        ...
 
     def spectral_density(self, frequency: FloatArray) -> FloatArray:
         """Return the one-sided density at frequencies in Hz, in V^2/Hz, of their shape."""
