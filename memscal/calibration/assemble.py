@@ -163,7 +163,7 @@ def _reconvolution(solution: Solution) -> Reconvolution:
     points = estimate.points
     if solution.per_repeat and not points.planar and max(solution.owners) == 0:
         # Repeats of one line are shown with their centres at that of the first.
-        axis = int(np.argmax(points.free[0]))
+        axis = np.argmax(points.free[0])
         place = estimate.offset[axis] + estimate.centre[axis]
     elif points.scans > 1 and estimate.points.order:
         # The sign of a shear depends on the side.

@@ -49,7 +49,7 @@ _Checks = Iterator[QualityCheck]
 
 #: The Bayes factor of a Gaussian sensor has mean one, and exceeds a thousand at most once in a
 #: thousand (Markov's inequality).
-_LOG_BAYES_LIMIT = -float(np.log(FALSE_ALARM))
+_LOG_BAYES_LIMIT = -math.log(FALSE_ALARM)
 _EDGE = "an edge: a flat top with steep flanks, as of a disc"
 _KINDS = {
     **dict.fromkeys(("edge", "rough edge", "disc"), _EDGE),
@@ -63,7 +63,7 @@ _KINDS = {
 #: tails at 0.1, 0.5 and 2 % noise, both of unstated noise (tests/accuracy/test_division.py).
 _ROUTES_LIMIT = 3.2
 #: Full width of a Gaussian at half of its maximum, over its standard deviation.
-_HALF_WIDTH = float(np.sqrt(8 * np.log(2)))
+_HALF_WIDTH = math.sqrt(8 * math.log(2))
 #: At this share of the thickness the base stress of a neo-Hookean film differs by a tenth.
 _DEEP = 0.1
 #: Of 1000 curvatures as their prior has them one is beyond; the noise hides less of it than all.
@@ -318,7 +318,7 @@ def _set_up(solution: Solution) -> _Checks:
 
 def _baseline(estimate: ProfileEstimate) -> _Checks:
     points = estimate.points
-    last = 1 + int(points.free[0].sum())
+    last = 1 + points.free[0].sum()
     yield check(
         "baseline_drift",
         2 * np.abs(estimate.drifts[1:last]).max() / estimate.largest_signal,
@@ -428,7 +428,7 @@ def _bayes_factor(estimate: ProfileEstimate) -> QualityCheck:
     kinds: dict[str, float] = {}
     for hypothesis, departure in zip(HYPOTHESES[1:], weighed.probability[1:], strict=True):
         if hypothesis.estimate > 0:
-            kinds[hypothesis.kind] = kinds.get(hypothesis.kind, 0.0) + float(departure)
+            kinds[hypothesis.kind] = kinds.get(hypothesis.kind, 0.0) + departure
     if estimate.free:
         departed = weighed.free
         kinds = {"plane": 1.0}

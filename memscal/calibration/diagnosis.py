@@ -79,7 +79,7 @@ def _clipped(scan: Scan) -> str:
     top = clipped_looks(scan.u_zz[np.isfinite(scan.u_zz)])
     if top.size:
         lowest = top[-1] - np.ptp(top) - _BELOW * abs(top[-1])
-        ceiling = scan.reading.text(float(lowest), ".6g")
+        ceiling = scan.reading.text(lowest, ".6g")
         return (
             f"{top.size} readings look clipped: they agree at {scan.reading.text(top[0], '.4g')}. "
             "If amplifier or converter was at its end there, leave them out (memscal import "
@@ -162,7 +162,7 @@ class _Trial:
     def loss(self, noise: float) -> float:
         """Chi-square of the residuals, linear beyond the knee."""
         root = np.sqrt(1 + (self.residual / (noise * _KNEE)) ** 2)
-        return float(np.sum(2 * _KNEE**2 * (root - 1)))
+        return np.sum(2 * _KNEE**2 * (root - 1))
 
     def explains(self, noise: float) -> bool:
         """Whether a sensor of some width fits, with a signal."""
@@ -241,7 +241,7 @@ class _Search:
         unscaled = trials[self.lengths[0]][0].loss(noise)
         per_degree = max(1.0, least / fitted[0].residual.size)
         most = min(unscaled - _CLEARLY * per_degree, 2 * least + _CLEARLY)
-        wider = noise * float(np.sqrt(per_degree))
+        wider = noise * np.sqrt(per_degree)
         causes = []
         others = []
         for length, trial in best.items():
@@ -266,7 +266,7 @@ class _Search:
         """Try the factors of a length until the misfit has risen twice."""
         trials = []
         for factor in length.factors:
-            trials.append(self._trial(length, float(factor)))
+            trials.append(self._trial(length, factor))
             losses = [trial.loss(1.0) for trial in trials]
             if len(losses) > 2 and min(losses[-2:]) > _RISEN * min(losses):
                 break
@@ -281,7 +281,7 @@ class _Search:
             return tried[0]
 
         def loss(exponent: float) -> float:
-            tried.append(self._trial(length, float(np.exp(exponent))))
+            tried.append(self._trial(length, np.exp(exponent)))
             return min(tried[-1].loss(noise), 1e300)
 
         middle = np.log(tried[0].factor)
@@ -298,7 +298,7 @@ class _Search:
         near = 1.0
         far = best.factor
         for _ in range(_HALVINGS):
-            middle = float(np.sqrt(near * far))
+            middle = np.sqrt(near * far)
             fits = self._trial(length, middle).loss(noise) <= enough
             near, far = (near, middle) if fits else (middle, far)
         return length.scaled(far, "at most " if far < 1 else "at least ")

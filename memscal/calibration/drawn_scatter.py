@@ -99,7 +99,7 @@ def _divided(
     band = find_band(estimate, smoothed)
     # The width of the Gaussian chooses the grid.
     gain = solution.estimate.gaussian.gain(solution.estimate.weights)
-    sigma = estimate.gaussian.sigma + float((gain[1:2] @ error)[0])
+    sigma = estimate.gaussian.sigma + (gain[1:2] @ error)[0]
     wider = replace(estimate, gaussian=replace(estimate.gaussian, sigma=sigma))
     fields = prepare_fields(estimate, smoothed, choose_grid(wider, band))
     band = beyond_zeros(band, estimate, fields.grid.wavenumber, fields.voltage.transform)

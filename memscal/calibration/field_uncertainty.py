@@ -172,12 +172,12 @@ class _Filter:
         every = 1
         for i, step in enumerate(fields.central.spacing):
             angle = 2 * np.pi * frequencies[i][band[i]]
-            waves = np.exp(-1j * np.multiply.outer(angle, np.rint(axes[i] / step)))
+            waves = np.exp(-1j * np.outer(angle, np.rint(axes[i] / step)))
             first = fields.index[i].min()
             nodes = np.arange(first, fields.index[i].max() + 1)
             at_nodes.append(waves)
             at_g.append(waves[:, stated[i]])
-            at_points.append(np.exp(-1j * np.multiply.outer(angle, nodes)))
+            at_points.append(np.exp(-1j * np.outer(angle, nodes)))
             index.append(fields.index[i] - first)
             every *= round((axes[i][1] - axes[i][0]) / step)
         box = (at_points[0].shape[1], at_points[1].shape[1])

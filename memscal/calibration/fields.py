@@ -42,7 +42,7 @@ class GridChoice:
 def choose_grid(estimate: ProfileEstimate, band: Band) -> GridChoice:
     """Choose the grid from the scan: every length from a length of the data."""
     points = estimate.points
-    support = rounded_reach(float(estimate.distance.max()), points.step)
+    support = rounded_reach(estimate.distance.max(), points.step)
     if points.as_raster:
         # A square of this half width lies within the raster's longer side.
         support = float(np.abs(points.x - estimate.centre[0]).max())
@@ -53,7 +53,7 @@ def choose_grid(estimate: ProfileEstimate, band: Band) -> GridChoice:
     last = estimate.model.k[closed[0] if closed.size else -1]
     spacing = min(estimate.gaussian.width / _POINTS_PER_WIDTH, np.pi / (2 * last))
     spacing = float(support / (_COUNTED * np.ceil(support / spacing / _COUNTED)))
-    span = max(float(np.ptp(offset)) for offset in estimate.offset)
+    span = max(np.ptp(offset) for offset in estimate.offset)
     extent = max(span, 1.25 * support)
     reasons = {
         "spacing": f"{spacing * 1e3:.4g} mm: {_POINTS_PER_WIDTH:g} points per Gaussian "
@@ -162,13 +162,13 @@ class RasterFields:
             )
         if lattice is None:
             steps = next(places.steps for places in points.places if all(places.steps))
-            nowhere = np.zeros(0, dtype=np.intp)
+            nowhere = np.zeros(0, np.intp)
             lattice = (
                 EvenAxis(points.x.min(), steps[0], nowhere),
                 EvenAxis(points.y.min(), steps[1], nowhere),
             )
-        x, columns = _continued(lattice[0], float(np.ptp(points.x)), choice.extent)
-        y, rows = _continued(lattice[1], float(np.ptp(points.y)), choice.extent)
+        x, columns = _continued(lattice[0], np.ptp(points.x), choice.extent)
+        y, rows = _continued(lattice[1], np.ptp(points.y), choice.extent)
         grid = Lattice(x - estimate.centre[0], y - estimate.centre[1])
         step = choice.spacing / 2
         reference = estimate.model.reference
@@ -228,7 +228,7 @@ class RasterFields:
         profiled = np.ones_like(self.voltage.values)
         np.subtract.at(profiled, self.index, share * smoothed.estimate.points.load)
         radius = self.grid.radius
-        table = wave_table(0, False, float(radius.max()), smoothed.estimate.model.k.tobytes())
+        table = wave_table(0, False, radius.max(), smoothed.estimate.model.k.tobytes())
         everywhere = table.interpolation(radius.ravel())
         # J0(k r) J0(k' r) over what has something of the profile, by the table's splines.
         both = (everywhere.T @ everywhere.multiply(profiled.reshape(-1, 1))) @ table.spline.c
@@ -272,4 +272,4 @@ def _continued(axis: EvenAxis, reach: float, extent: float) -> tuple[FloatArray,
     padding = int(np.ceil(max(2 * extent - reach, 0.0) / (2 * axis.step))) + 1
     count = steps + 1 + 2 * padding + steps % 2
     nodes = axis.start + axis.step * (np.arange(count) - padding)
-    return np.asarray(nodes, dtype=np.float64), axis.index + padding
+    return np.asarray(nodes, np.float64), axis.index + padding

@@ -135,7 +135,7 @@ def weigh_laws(solution: Solution) -> FilmLawComparison | None:
     laws = []
     for law, by_law in solutions.items():
         estimate = replace(by_law.estimate, weights=weights, outlier_weight=outlier)
-        evidence = float(log_marginal_likelihood(estimate, _input_columns(by_law), noise)[0])
+        evidence = log_marginal_likelihood(estimate, _input_columns(by_law), noise)[0]
         a = by_law.deconvolution.conversion_constant
         laws.append(WeighedLaw(law, evidence, a, estimate.gaussian.sigma))
     laws.sort(key=lambda law: -law.log_evidence)

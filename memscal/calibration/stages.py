@@ -288,7 +288,7 @@ class Solution:
         # Within R the integral is that of R U(k) J_1(kR) dk over all k.
         k = spectrum.wavenumbers.k
         dk = 2 * np.pi * spectrum.wavenumbers.weights / k
-        inside = reach * float(np.sum(dk * spectrum.values * j1(k * reach)))
+        inside = reach * np.sum(dk * spectrum.values * j1(k * reach))
         return abs(1 - inside / spectrum.integral)
 
 
@@ -297,9 +297,9 @@ def _misfit(estimate: ProfileEstimate, predicted: FloatArray) -> Misfit:
     data = estimate.points
     residual = data.u - predicted
     weight = estimate.outlier_weight
-    degrees = float(weight.sum()) + data.curved.size - estimate.gaussian.jacobian.shape[1]
+    degrees = weight.sum() + data.curved.size - estimate.gaussian.jacobian.shape[1]
     rms = float(np.sqrt(np.average(residual**2, weights=weight)) / estimate.largest_signal)
     # As stated, uncertain positions and correlations included, where anything is stated.
     noise = 1.0 if data.u_errors is not None else estimate.noise_scale
-    square = float(np.sum(data.standardised(residual, estimate.weights) ** 2))
+    square = np.sum(data.standardised(residual, estimate.weights) ** 2)
     return Misfit(rms, square / noise**2 / degrees, degrees)

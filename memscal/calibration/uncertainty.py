@@ -155,7 +155,7 @@ def _load_effects(
             continue
         by_scan = np.array([share or 0.0 for share in stated])
         apart = (by_scan - by_scan.mean())[estimate.points.scan]
-        effects[source] = InputEffect(-apart * estimate.signal, -float(by_scan.mean()))
+        effects[source] = InputEffect(-apart * estimate.signal, -by_scan.mean())
     return effects
 
 
@@ -174,7 +174,7 @@ def _varying_gain(estimate: ProfileEstimate) -> float:
     products = []
     for repeat in repeats:
         data, own = np.split(columns[points.repeat == repeat], [2], axis=1)
-        data = data - own @ np.linalg.lstsq(own, data, rcond=None)[0]
+        data = data - own @ np.linalg.lstsq(own, data)[0]
         products.append(data[:, 0] @ data)
     weight, product = np.transpose(products)
     # A repeat that tells nothing of its gain lets no variation be found.
@@ -198,7 +198,7 @@ def correlation_matrix(sources: Sequence[str], correlations: Correlations) -> Fl
             raise InputError(f"The correlation of {names} is {coefficient:g}, outside -1 to 1.")
         i, j = (sources.index(name) for name in pair)
         matrix[i, j] = matrix[j, i] = coefficient
-    least = float(np.linalg.eigvalsh(matrix)[0]) if sources else 1.0
+    least = np.linalg.eigvalsh(matrix)[0] if sources else 1.0
     if least < -1e-9:
         raise InputError(
             "The correlations of the inputs contradict each other: their matrix has the eigenvalue "
@@ -335,7 +335,7 @@ def _effective_degrees(
     # Welch and Satterthwaite: GUM (JCGM 100:2008), G.4.1.
     if estimate.points.u_errors is not None:
         return {}
-    readings = float(estimate.outlier_weight.sum()) + estimate.points.curved.size
+    readings = estimate.outlier_weight.sum() + estimate.points.curved.size
     degrees = max(readings - estimate.basis.flat, 1.0)
     if estimate.raster_noise is not None:
         degrees = max(degrees, estimate.raster_noise.degrees)
@@ -586,7 +586,7 @@ def _division_map(
     rings = ring_areas(r)
 
     # From changes of A G at its radii to those of A, G and its transfer function.
-    by_radius = (np.eye(r.size) - np.multiply.outer(deconvolution.g.radial, rings)) / a
+    by_radius = (np.eye(r.size) - np.outer(deconvolution.g.radial, rings)) / a
     normalised = np.vstack([rings, by_radius, (bessel_table(wavenumbers, r) * rings) @ by_radius])
     gain = fields.gain(smoothed) if isinstance(fields, RasterFields) else smoothed.gain
     direct = normalised @ synthesis @ gain

@@ -419,10 +419,10 @@ def _choice(flat: int, sizes: tuple[int, ...], families: tuple[Family, ...]) -> 
     # Beside a G that is free in the plane the Gaussian stands alone.
     asked = HYPOTHESES if sizes else HYPOTHESES[:1]
     known = [(i, h) for i, h in enumerate(asked) if h.family in (None, *families)]
-    family = np.zeros(len(known), dtype=np.intp)
+    family = np.zeros(len(known), np.intp)
     strength = np.ones(len(known))
     # Equal numbers of columns for all: one batch of decompositions.
-    places = np.zeros((len(known), max(sizes, default=1) + bool(families)), dtype=np.intp)
+    places = np.zeros((len(known), max(sizes, default=1) + bool(families)), np.intp)
     factors = np.zeros(places.shape)
     for row, (_, hypothesis) in enumerate(known):
         factor = hypothesis.strength
@@ -444,7 +444,7 @@ def _choice(flat: int, sizes: tuple[int, ...], families: tuple[Family, ...]) -> 
 def supported(basis: DepartureBasis, weighed: WeighedFit) -> tuple[DepartureBasis, WeighedFit]:
     """Leave out the shapes and families of negligible probability."""
     variances = np.diag(weighed.covariance)
-    used = [bool(variances[block].any()) for block in basis.blocks]
+    used = [variances[block].any() for block in basis.blocks]
     columns = [np.arange(block.start, block.stop) for block in compress(basis.blocks, used)]
     chosen = np.concatenate([np.arange(basis.flat), *columns])
     rings = tuple(compress(basis.rings, used))

@@ -236,7 +236,7 @@ class DepartureBasis:
         """Columns of each shape, then of each family: its sensor less the Gaussian, changes."""
         counts = [*(ring.radius.size for ring in self.rings), *(3 for _ in self.families)]
         ends = self.flat + np.cumsum([0, *counts])
-        return tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
+        return tuple(slice(a, b) for a, b in pairwise(ends))
 
     def kernels(self, k: FloatArray) -> FloatArray:
         """Transforms of all columns at ``k`` (rad/m), shape (k, p)."""
@@ -365,4 +365,4 @@ def _fitted_families(reduced: ReducedScan) -> Iterator[FamilyFit]:
             break
     for family, width, amplitude in zip(FAMILIES, widths, amplitudes, strict=True):
         if amplitude > 0 and start / _FARTHEST < width < start * _FARTHEST:
-            yield FamilyFit(family, float(amplitude), float(width))
+            yield FamilyFit(family, amplitude, width)

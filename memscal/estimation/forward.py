@@ -62,7 +62,7 @@ def _wave(
     wave: int, r: FloatArray, k: FloatArray, across: bool, below: Sequence[FloatArray] = ()
 ) -> FloatArray:
     """A wave at all products of radii and wavenumbers: cosines and sines where it is a slit's."""
-    x = np.multiply.outer(r, k)
+    x = np.outer(r, k)
     if across:
         return 2 * (np.cos, np.sin)[wave](x) / k
     if wave == TURN:
@@ -336,7 +336,7 @@ class ForwardModel:
         sigma, e1, e2 = ellipses.T
         size = np.hypot(e1, e2)
         tilt = 0.5 * np.arctan2(e2, e1)
-        half = 0.5 * np.multiply.outer(self.k, sigma) ** 2
+        half = 0.5 * np.outer(self.k, sigma) ** 2
         step = np.exp(2j * np.subtract.outer(angle, tilt))
         phasor = np.ones_like(step)
         responses = np.zeros((len(ellipses), angle.size))

@@ -56,9 +56,9 @@ def gauss_newton(
         root = stretch**-0.5
         # The triangular factor of both stands for them.
         both = triangular(np.column_stack([slope * root[:, None], -residual * root]))
-        whole = np.linalg.lstsq(both[:, :-1], both[:, -1], rcond=None)[0]
+        whole = np.linalg.lstsq(both[:, :-1], both[:, -1])[0]
         longest = np.abs(whole).max()
-        step = np.asarray(whole * (_LONGEST_STEP / max(longest, _LONGEST_STEP)), dtype=np.float64)
+        step = np.asarray(whole * (_LONGEST_STEP / max(longest, _LONGEST_STEP)))
         place = place + step
         cost = loss
         if longest < tolerance:
@@ -78,7 +78,7 @@ def _require_parity(points: ScanPoints, odd: ArrayPair, even: ArrayPair) -> None
     turned = np.min(costs, where=amplitudes < 0, initial=np.inf)
     name = f"u_{points.channel}"
     along = points.channel[0]
-    if float(even[1].min()) < _CLEARLY * min(right, turned):
+    if even[1].min() < _CLEARLY * min(right, turned):
         raise InputError(
             f"{name} is the same on both sides of the sensor.",
             why="A shear changes its sign where the indenter passes the sensor; a normal stress "
@@ -153,10 +153,10 @@ def _robust_start_of_scan(model: ForwardModel, weights: FloatArray) -> ArrayTrip
         potentials = wavenumbers.synthesise(spectra / model.k[:, None], radii).T
         even = [np.interp(distances, radii, table) * factors for table in potentials]
         _require_parity(points, (amplitudes, costs), _amplitudes(np.concatenate(even), data, drift))
-    i = int(np.argmin(np.where(amplitudes > 0, costs, np.inf)))
+    i = np.argmin(np.where(amplitudes > 0, costs, np.inf))
     if not amplitudes[i] > 0:
         raise _undetermined(model)
-    baseline = np.linalg.lstsq(drift, data - amplitudes[i] * shapes[i], rcond=None)[0]
+    baseline = np.linalg.lstsq(drift, data - amplitudes[i] * shapes[i])[0]
     shape = np.array([amplitudes[i], widths[i // len(centres)]])
     return shape, centres[i % len(centres)][points.free[0]], baseline
 
@@ -304,7 +304,7 @@ def _solve(
     begin = start / scale
     fit = linearise(model, begin * scale)
     left = points.standardised(points.u - fit.predicted, weights)
-    noise = robust_scale(left, 1e-12 * float(np.abs(left).max()) + TINY)
+    noise = robust_scale(left, 1e-12 * np.abs(left).max() + TINY)
     # The solvers ask for residuals and slopes one after the other, at the same place.
     last = {begin.tobytes(): fit}
     prior = points.prior_rows

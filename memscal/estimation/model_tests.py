@@ -53,12 +53,12 @@ def hold_out(estimate: ProfileEstimate, group: IndexArray) -> HeldOut | None:
     model = residuals.free_model(estimate, clip_outliers=True)
     # Centre, baseline and drift are fitted to a held-out group by itself.
     nuisances = slice(2, estimate.points.centres.stop + estimate.model.straight_columns.shape[1])
-    count = int(group.max()) + 1
+    count = group.max() + 1
     # Of too many groups, neighbouring ones are joined.
     fold = (group * min(count, _MOST_FOLDS) // count)[model.point]
     # The triangular factors of each fold's design and data stand for them.
     both = np.column_stack([model.design, model.data])
-    roots = {int(i): triangular(both[fold == i]) for i in np.unique(fold)}
+    roots = {i: triangular(both[fold == i]) for i in np.unique(fold)}
     sizes = np.bincount(fold)
     ratios = {}
     for i in roots:
@@ -83,11 +83,11 @@ def _predict(
     # What a fold alone determines is zero in the others but for rounding.
     size = np.linalg.norm(both[:, :-1], axis=0)
     others, rank = _left_over(rest, size)
-    others_degrees = int(sizes.sum() - sizes[out]) - rank
+    others_degrees = sizes.sum() - sizes[out] - rank
     own_nuisances = both[:, nuisances].copy()
     own_nuisances[: len(rest)] = 0.0
     left, rank = _left_over(np.hstack([own_nuisances, both]), np.append(size[nuisances], size))
-    degrees = int(sizes.sum()) - rank - others_degrees
+    degrees = sizes.sum() - rank - others_degrees
     if degrees < FEWEST_RESIDUALS or others_degrees < FEWEST_RESIDUALS:
         return None
     value = max(left - others, 0.0) / degrees
@@ -156,9 +156,9 @@ def _add(estimate: ProfileEstimate, columns: FloatArray) -> ExtraColumns:
     root = triangular(estimate.points.standardised(np.hstack([gaussian, columns, left]), weights))
     free = root[count:, count:-1]
     residual = root[count:, -1]
-    coefficients = np.linalg.lstsq(free, residual, rcond=None)[0]
+    coefficients = np.linalg.lstsq(free, residual)[0]
     fall = float(residual @ free @ coefficients)
-    size = float(np.abs(columns @ coefficients).max() / estimate.largest_signal)
+    size = np.abs(columns @ coefficients).max() / estimate.largest_signal
     return ExtraColumns(fall, columns.shape[1], coefficients / scale, size)
 
 
@@ -183,7 +183,7 @@ _ENOUGH = 10_000
 
 def clipped_points(estimate: ProfileEstimate) -> BoolArray:
     """Say which points were held at a ceiling, shape (n,), of a channel that is no shear."""
-    clipped = np.zeros(estimate.points.u.size, dtype=np.bool_)
+    clipped = np.zeros(estimate.points.u.size, bool)
     for inside in estimate.points.inside:
         agreeing, top = _agreeing(estimate, inside)
         for flat in (agreeing, _plateau(estimate, inside)):
@@ -260,14 +260,14 @@ def _plateau(estimate: ProfileEstimate, inside: BoolArray) -> BoolArray:
     u = estimate.points.u[order]
     plateau = np.zeros_like(inside)
     # Scatter about the mean of the first points, for every number of them.
-    half = int(inside.sum()) // 2
+    half = inside.sum() // 2
     weight = estimate.noise[order][:half] ** -2
     offset = u[:half] - u[:1]
     total, first, second = (np.cumsum(weight * offset**power) for power in range(3))
     scatter = second - first**2 / total
     count = np.arange(1, half + 1)
     beyond = (scatter > chdtri(np.maximum(count - 1, 1), _ALIKE)) & (count >= FEWEST_AT_CEILING)
-    last = int(np.argmax(beyond)) if beyond.any() else half - 1
+    last = np.argmax(beyond) if beyond.any() else half - 1
     if last >= FEWEST_AT_CEILING:
         plateau[order[:last]] = True
     return plateau

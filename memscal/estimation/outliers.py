@@ -37,7 +37,7 @@ def point_weights(
     # in robust standard deviations of their own, of ``least`` or more; on a raster in those of
     # their neighbours where these are larger.
     root = np.sqrt(stated)
-    least = _MODEL * float(np.abs(points.u).max() * np.sqrt(np.median(stated)))
+    least = _MODEL * (np.abs(points.u).max() * np.sqrt(np.median(stated)))
     standardised = residual * root
     scale: FloatArray | float = robust_scale(standardised, least)
     if points.planar:
@@ -78,7 +78,7 @@ def raster_noise(
     square = np.sum((differences @ residual) ** 2)
     # Differences that share readings are correlated (Satterthwaite, Biometrics Bull. 2, 1946).
     degrees = count**2 / (differences @ differences.T).power(2).sum()
-    return RasterNoise(float(np.sqrt(square / count)), float(degrees))
+    return RasterNoise(np.sqrt(square / count), degrees)
 
 
 def variances_nearby(points: ScanPoints, residual: FloatArray) -> FloatArray:

@@ -167,7 +167,7 @@ class ScanPoints:
     @property
     def centres(self) -> slice:
         """Places of the free centres among the parameters of a Gaussian fit."""
-        return slice(2, 2 + int(self.free.sum()))
+        return slice(2, 2 + self.free.sum())
 
     @property
     def curvatures(self) -> slice:
@@ -195,7 +195,7 @@ class ScanPoints:
 
     def place_numbers(self, name: str) -> IndexArray:
         """Return ``index``, ``row`` or ``readings`` of the places for all points, shape (n,)."""
-        values = np.empty(self.u.size, dtype=np.intp)
+        values = np.empty(self.u.size, np.intp)
         for scan, places in enumerate(self.places):
             values[self.scan == scan] = getattr(places, name)
         return values
@@ -259,7 +259,7 @@ class ScanPoints:
         left, singular, _ = np.linalg.svd(changes, full_matrices=False)
         factor = self.decorrelation or Decorrelation(())
         factor = replace(factor, common=(*factor.common, (left, np.hypot(1, singular))))
-        return replace(self, decorrelation=factor), float(np.log1p(singular**2).sum())
+        return replace(self, decorrelation=factor), np.log1p(singular**2).sum()
 
     def sharing_positions(self, moved: FloatArray, stated: FloatArray) -> ScanPoints:
         """Return the points with the errors of their positions in common to repeats.
@@ -319,8 +319,8 @@ def measured_points(scan: Scan, channel: str = "zz") -> ScanPoints:
     x_errors = 0.0 if scan.x_errors is None else scan.x_errors
     branch = np.zeros(u.shape, np.int64) if scan.branch is None else scan.branch
     correlation = None if channel_order(channel) else scan.u_zz_correlation
-    count = int(keep.sum())
-    first = np.zeros(count, dtype=np.intp)
+    count = keep.sum()
+    first = np.zeros(count, np.intp)
     points = ScanPoints(
         x=x[keep],
         y=y[keep],
@@ -354,7 +354,7 @@ def calibration_points(scan: Scan, channel: str = "zz") -> ScanPoints:
     relative = scan.baseline_curvature_uncertainty
     # The median of three points does not follow a single outlier.
     rise = np.sort(np.abs(rise_of(points.x, points.y, points.u)))
-    deviation = float(np.median(rise[-3:])) * (CURVATURE if relative is None else relative)
+    deviation = np.median(rise[-3:]) * (CURVATURE if relative is None else relative)
     return replace(points, curvature=np.array([deviation]))
 
 
@@ -458,7 +458,7 @@ def joined_points(scans: Sequence[ScanPoints], owners: Sequence[int] | None = No
             cure="State it in every scan, or leave it out of every one.",
         )
     number = np.repeat(np.arange(len(scans)), [points.u.size for points in scans])
-    before = np.cumsum([0, *(int(points.repeat.max()) + 1 for points in scans)])
+    before = np.cumsum([0, *(points.repeat.max() + 1 for points in scans)])
     names = ("x", "y", "u", "load", "x_errors", "branch", "anew", "free", "curvature", "repeat")
     columns = {name: np.concatenate([getattr(each, name) for each in scans]) for name in names}
     columns["repeat"] += before[number]
@@ -501,7 +501,7 @@ def _decorrelation(correlation: FloatArray, keep: BoolArray) -> Decorrelation:
 def ordinary_readings(points: ScanPoints) -> BoolArray:
     """Say which readings (n,) are not among a few that lie far beyond all others of their scan."""
     # A converter's sentinel would draw amplitude and baseline to itself, above all at an end.
-    ordinary = np.ones(points.u.size, dtype=np.bool_)
+    ordinary = np.ones(points.u.size, bool)
     share = _FEW_OF_RASTER if points.planar else _FEW_OF_LINE
     for inside in points.inside:
         rows = np.flatnonzero(inside)
@@ -511,7 +511,7 @@ def ordinary_readings(points: ScanPoints) -> BoolArray:
         farthest = distance[order[-few - 1 :]]
         beyond = farthest[1:] > _WILD * farthest[:-1]
         if beyond.any():
-            ordinary[rows[order[int(np.argmax(beyond)) - few :]]] = False
+            ordinary[rows[order[np.argmax(beyond) - few :]]] = False
     return ordinary
 
 
@@ -607,4 +607,4 @@ def across(correlation: FloatArray, group: IndexArray) -> bool:
     if not is_banded(correlation):
         return bool(correlation[np.not_equal.outer(group, group)].any())
     columns = range(1, correlation.shape[1])
-    return any(bool(correlation[:-j, j][group[j:] != group[:-j]].any()) for j in columns)
+    return any(correlation[:-j, j][group[j:] != group[:-j]].any() for j in columns)

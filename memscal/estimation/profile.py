@@ -310,7 +310,7 @@ def estimate_profile(
         # The noise of the voltages alone: a curvature beyond its prior is none.
         left = points.standardised(residual, weights)
         freedom = max(count - fit.jacobian.shape[1], 1.0)
-        unit = max(float(np.sqrt(left @ left / freedom)), noise)
+        unit = max(np.sqrt(left @ left / freedom), noise)
         # A residual counts by the root of its weight.
         weighed_alike = np.allclose(updated**0.5, outlier**0.5, atol=0.02)
         # By the noise the prior of a curvature is weighed.
@@ -406,8 +406,8 @@ def gaussian_log_marginal(estimate: ProfileEstimate, fit: GaussianFit) -> float:
     # The prior of a curvature is a further reading.
     _, prior = fit.prior
     left = np.append(fit.points.standardised(fit.points.u - fit.predicted, weights), prior)
-    freedom = float(estimate.outlier_weight.sum()) + prior.size - fit.jacobian.shape[1]
-    variance = max(float(left @ left) / freedom, _least_noise(fit) ** 2)
+    freedom = estimate.outlier_weight.sum() + prior.size - fit.jacobian.shape[1]
+    variance = max(left @ left / freedom, _least_noise(fit) ** 2)
     loss = freedom * math.log(variance) + left @ left / variance
     # The flat priors are of ln A and ln(width).
     _, volume = np.linalg.slogdet(fit.covariance(weights, 1.0))
@@ -485,13 +485,13 @@ def _why_undetermined(estimate: ProfileEstimate, *, shown: bool) -> str:
     # ``shown``: whether noise and baseline alone would leave it distinct from zero.
     base = np.linalg.qr(estimate.model.straight_columns)[0]
     rise = np.ptp(estimate.predicted - base @ (base.T @ estimate.predicted))
-    ratio = rise / float(np.median(estimate.noise))
+    ratio = rise / np.median(estimate.noise)
     varied = estimate.points.reading.text(rise)
     varies = f"Beside a line the voltage varies by {varied}, {ratio:.3g} times its noise"
     if ratio < _LEAST_RISE:
         return f"{varies}: it does not rise above its noise as the indenter passes."
     signal = np.abs(estimate.signal)
-    farthest = int(np.argmax(estimate.distance))
+    farthest = np.argmax(estimate.distance)
     left = signal[farthest] / signal.max()
     if left > _LEFT:
         return (

@@ -190,9 +190,9 @@ def pure_error_test(estimate: ProfileEstimate, model: FreeModel) -> TestOutcome 
     near = moved @ (right[apart].T / singular[apart])
     scatter = within(model.data[:, None])[:, 0]
     scatter -= near @ (near.T @ scatter)
-    pure = float(scatter @ scatter)
-    pure_degrees = group.size - int(group.max()) - 1 - near.shape[1]
-    misfit = max(float(model.left_over @ model.left_over) - pure, 0.0)
+    pure = scatter @ scatter
+    pure_degrees = group.size - group.max() - 1 - near.shape[1]
+    misfit = max(model.left_over @ model.left_over - pure, 0.0)
     degrees = group.size - model.basis.shape[1] - pure_degrees
     if degrees < FEWEST_RESIDUALS or pure_degrees < FEWEST_RESIDUALS or pure == 0.0:
         return None
@@ -205,14 +205,14 @@ def ring_test(
     """Test a raster's residuals (n,) in rings of wavenumbers against noise known by ``rest``."""
     # In a ring of n components the power is chi-square of n degrees, F where the noise is
     # estimated; the least likely of several rings by Bonferroni.
-    plane = np.zeros([int(np.ptp(i)) + 1 for i in index])
+    plane = np.zeros([np.ptp(i) + 1 for i in index])
     np.add.at(plane, tuple(i - i.min() for i in index), left)
     power = np.abs(np.fft.fft2(plane)) ** 2 / (noise @ noise)
     cycles = [np.fft.fftfreq(count) * max(plane.shape) for count in plane.shape]
     ring = np.rint(np.hypot.outer(*cycles)).astype(np.intp).ravel()
     count = np.bincount(ring)
     ratio = np.bincount(ring, power.ravel()) / count / _NEGLIGIBLE
-    worst = int(np.argmax(ratio / fdtri(count, rest, 1 - FALSE_ALARM / count.size)))
+    worst = np.argmax(ratio / fdtri(count, rest, 1 - FALSE_ALARM / count.size))
     return ratio_outcome(float(ratio[worst]), count[worst], rest, of=count.size)
 
 
@@ -242,12 +242,12 @@ def steps_test(residuals: Residuals) -> TestOutcome:
     # What no baseline and no G takes of a step.
     square = steps[:, 1] - np.sum(steps[:, 2:] ** 2, axis=1)
     tested = square > _LEAST_STEP
-    count = max(int(tested.sum()), 1)
-    value = float(np.max(steps[tested, 0] ** 2 / square[tested], initial=0.0))
+    count = max(tested.sum(), 1)
+    value = np.max(steps[tested, 0] ** 2 / square[tested], initial=0.0)
     rest = None
     if not residuals.stated:
         rest = residuals.degrees - 1
-        value = rest * value / max(float(values @ values) - value, TINY)
+        value = rest * value / max(values @ values - value, TINY)
     outcome = ratio_outcome(value, 1, rest, of=count)
     return TestOutcome(math.sqrt(value), math.sqrt(outcome.limit), outcome.p_value)
 
@@ -300,7 +300,7 @@ def _traces(pairs: csr_array, basis: FloatArray) -> tuple[float, float, float]:
     first, second, third = products
     squared += np.sum(first * first.T) - 2 * np.trace(second)
     cubed += 3 * np.sum(first * second) - 3 * np.trace(third) - np.trace(first @ first @ first)
-    return float(-np.trace(first)), float(squared), float(cubed)
+    return -np.trace(first), squared, cubed
 
 
 def orthonormal(design: FloatArray, size: FloatArray | None = None) -> FloatArray:

@@ -49,7 +49,7 @@ class _Fit:
         flat = np.linalg.norm(estimate.gaussian.jacobian, axis=0)
         root[: flat.size] /= flat[:, None]
         leverage = np.sum(basis**2, axis=1)
-        degrees = leverage.size - round(float(leverage.sum()))
+        degrees = leverage.size - round(leverage.sum())
         if degrees < FEWEST_RESIDUALS:
             return None
         scaled = root * np.linalg.norm(left) / np.sqrt(degrees)
@@ -57,7 +57,7 @@ class _Fit:
 
     def tested(self, values: FloatArray, rows: FloatArray, of: int = 1) -> TestOutcome:
         """Test sums of coefficients, by those of the root, as one of so many tests: an F ratio."""
-        z = np.linalg.lstsq(rows, values, rcond=None)[0]
+        z = np.linalg.lstsq(rows, values)[0]
         return ratio_outcome(float(z @ z) / len(rows), len(rows), self.degrees, of)
 
 
@@ -75,7 +75,7 @@ def repeat_centres_test(estimate: ProfileEstimate) -> CentresApart | None:
     count = readings.size
     if points.planar or count == points.scans or readings.min() < MINIMUM_POSITIONS:
         return None
-    own = np.equal.outer(number, np.arange(count)).astype(np.float64)
+    own = np.eye(count)[number]
     along = points.along(points.positions)[:, None]
     shift = estimate.model.shift_derivative(estimate.gaussian.geometry, estimate.kernel)
     # The first repeat of each scan has the scan's centre, the others are shifted from it.  Each has
@@ -91,7 +91,7 @@ def repeat_centres_test(estimate: ProfileEstimate) -> CentresApart | None:
     places[shifted] = moved
     return CentresApart(
         **vars(fit.tested(moved, fit.root[-moved.size :])),
-        distance=max(float(np.ptp(places[scan == i])) for i in range(points.scans)),
+        distance=max(np.ptp(places[scan == i]) for i in range(points.scans)),
     )
 
 
@@ -170,9 +170,9 @@ def _centres_apart(
     scatter = inside @ inside / max(freedom, 1)
     noise = np.sum(root**2) / group.size
     if freedom and fdtrc(freedom, degrees, scatter / noise) < _WANDERS:
-        error = float(np.sqrt(scatter * share @ share))
+        error = np.sqrt(scatter * share @ share)
         degrees = freedom
-    return float(share @ centres), error, degrees
+    return share @ centres, error, degrees
 
 
 @array_record
@@ -196,7 +196,7 @@ def compare_runs(estimate: ProfileEstimate) -> RunsApart | None:
     count = readings.size
     if count == 1:
         return None
-    own = np.equal.outer(number, np.arange(count)).astype(np.float64)
+    own = np.eye(count)[number]
     fit = _Fit.of(estimate, np.hstack([own[:, 1:] * estimate.signal[:, None], own]))
     if fit is None:
         return None

@@ -191,8 +191,8 @@ def _farthest(scan: Scan, stress: BaseStress) -> SimpleNamespace:
     stated = [u for u in (scan.load_uncertainty, scan.normal_load_errors) if u is not None]
     spread = np.sqrt(sum((np.square(u) for u in stated), start=np.zeros(loads.shape)))
     i = np.nanargmax(np.abs(loads - stress.load) - COVERAGE * spread)
-    uncertainty = float(spread.flat[i]) if stated else None
-    return SimpleNamespace(load=float(loads.flat[i]), load_uncertainty=uncertainty)
+    uncertainty = spread.flat[i] if stated else None
+    return SimpleNamespace(load=loads.flat[i], load_uncertainty=uncertainty)
 
 
 def file_in_words(source: SourceFile | None, kind: str) -> str:

@@ -46,10 +46,10 @@ def slow_noise(estimate: ProfileEstimate, residuals: Residuals) -> SlowNoise | N
     log_weight -= np.log(ends[:, :-1]).sum(axis=1) + residuals.degrees / 2 * np.log(square)
     weight = np.exp(log_weight - np.logaddexp.reduce(log_weight))
     covariance = np.tensordot(weight * square / square[0], kinds, 1)
-    probability = float(weight[1:].sum())
+    probability = weight[1:].sum()
     return SlowNoise(
         probability=probability,
-        length=float(weight[1:] @ _LENGTHS[1:]) / probability,
-        share=float(weight @ _SHARES) / probability,
+        length=weight[1:] @ _LENGTHS[1:] / probability,
+        share=weight @ _SHARES / probability,
         covariance=Decorrelation(((residuals.point, np.linalg.cholesky(covariance)),)),
     )

@@ -258,7 +258,7 @@ def _layout(
     # What no penalty holds, a parabola, is held by next to nothing.
     rows = np.vstack([curved, _NEXT_TO_NOTHING * values]) @ free
     rows *= np.tile(np.sqrt(weights * rho), 2)[:, None]
-    phase = np.multiply.outer(k, nodes)
+    phase = np.outer(k, nodes)
     bessel = 2 * np.cos(phase) if order == ACROSS else 2 * np.pi * j0(phase) * nodes
     bessel *= weights
     transform = bessel @ values @ free

@@ -146,7 +146,7 @@ def _shown_radius(radial: ApparatusRadial) -> float:
         return last
     # Ripples of a poor deconvolution reach far; the Gaussian bounds the sensor.
     far = min(radial.r[alive[-1]], 1.6 * radial.r[gaussian_alive[-1]])
-    return float(min(1.1 * far, last)) or last
+    return min(1.1 * far, last) or last
 
 
 def _peak(radial: ApparatusRadial) -> float:

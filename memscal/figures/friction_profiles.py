@@ -132,7 +132,7 @@ def _draw_points(
     r = profile.r / MM
     s = profile.s_zz / KPA
     bars = coverage() * profile.s_zz_errors / KPA
-    clear = s > bars if logarithmic else np.ones(s.size, dtype=bool)
+    clear = s > bars if logarithmic else np.ones(s.size, bool)
     look = mark(at_load.lubrication, colour) | _BARS | {"many": s.size > SCATTER_THRESHOLD}
     for shown, alpha in ((clear, None), (~clear & (s > 0), _PALE)):
         if shown.any():

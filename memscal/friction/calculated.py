@@ -90,7 +90,7 @@ def external_family(
 
     def numbers(name: str) -> FloatArray:
         """Numbers of all tables, not a number where one is not stated."""
-        return np.array([[getattr(cell, name) for cell in row] for row in grid], dtype=np.float64)
+        return np.array([[getattr(cell, name) for cell in row] for row in grid], np.float64)
 
     return replace(
         solved,

@@ -347,7 +347,7 @@ def _readings(
     """Yield the name of each load, its readings of channels, and whether these share noise."""
     if isinstance(item, Scan):
         for single in single_loads(item):
-            count = len(channels) * int(measured_mask(single).sum())
+            count = len(channels) * measured_mask(single).sum()
             shared = len(channels) > 1 or single.u_zz_correlation is not None
             yield load_of(single), count, shared
         return

@@ -188,7 +188,7 @@ def with_loading(by_loading: ByLoading, *, tested: bool) -> dict[str, BoundedEst
 
     Where neither passes the chi-square, if it tests anything, nothing is left.
     """
-    estimates = list(by_loading.values())
+    estimates = by_loading.values()
     if tested and max(estimate.p_value for estimate in estimates) < FALSE_ALARM:
         return {
             loading: replace(

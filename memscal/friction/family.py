@@ -132,7 +132,7 @@ class ProfileFamily(FrozenArrays):
 
     def only(self, loads_index: int | Sequence[int]) -> ProfileFamily:
         """Return the family at one or several of its loads, by index, in the order given."""
-        chosen = np.atleast_1d(np.asarray(loads_index, dtype=np.intp))
+        chosen = np.atleast_1d(np.asarray(loads_index, np.intp))
         names = ["spectra", "by_load", *_NUMBERS]
         if self.slopes is not None:
             names.append("slopes")
@@ -148,7 +148,7 @@ class ProfileFamily(FrozenArrays):
         stack = np.stack([self.spectra, self.by_load, *self.changes.values()], axis=1)
         if self.values.size == 1:  # a constant
             return PPoly(stack[None], [0.0, 1.0])
-        return PchipInterpolator(self.coordinates, stack, axis=0)
+        return PchipInterpolator(self.coordinates, stack)
 
 
 #: Smaller steps of Poisson's ratio would show the rings' placing beside the change.
@@ -358,7 +358,7 @@ class FamilySetup:
 
             # By the logarithm of the length: t (1 - t) times that by the bounded coordinate t.
             t = bounded(*lengths)
-            slopes = PchipInterpolator(t, spectra, axis=0)(t, 1)
+            slopes = PchipInterpolator(t, spectra)(t, 1)
             by_length = (t * (1 - t))[:, None, None] * slopes
         # Changes by one stated standard uncertainty, by the scales of the contact, from derivatives
         # by the logarithms of load, wavenumber and length of the interface:

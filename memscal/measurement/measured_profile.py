@@ -146,7 +146,7 @@ def require_points(scan: Scan, signal: ContactSignal) -> None:
     missing = np.diff(places) - 1
     gaps = np.where(missing > 0, np.diff(x[places]), 0.0)
     if gaps.size and gaps.max() > signal.contact_radius:
-        i = int(np.argmax(gaps))
+        i = np.argmax(gaps)
         first = x[places[i] + 1]
         last = x[places[i + 1] - 1]
         raise InputError(
@@ -169,7 +169,7 @@ def require_ends(scan: Scan, signal: ContactSignal, centre: FloatArray) -> None:
     for axis, middle in axes:
         ends += np.abs([axis.min() - middle, axis.max() - middle]).tolist()
     calculated = signal.voltage[0]
-    left = float(np.interp(ends, signal.r, calculated).max() / calculated.max())
+    left = np.interp(ends, signal.r, calculated).max() / calculated.max()
     if left > _LARGEST_END:
         raise FitError(
             f"{load_of(scan)}: the scan ends {min(ends) * 1e3:.3g} mm from its centre, "
@@ -365,7 +365,7 @@ def measured_profile(
     roots = {"noise": noise_root / a, "conversion_constant": u_a / a * s_zz[:, None]}
     roots |= _place_roots(restored, average)
     maximum, budget = _on_axis(restored)
-    curve_r = np.linspace(0.0, float(r[order][-1]), 301)
+    curve_r = np.linspace(0.0, r[order][-1], 301)
     return MeasuredProfile(
         scan=origin,
         load=scan.stated_load,

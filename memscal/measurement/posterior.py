@@ -214,7 +214,7 @@ def _averaged_shapes(scan: Scan, start: ProfileEstimate) -> _PressureEstimate:
 
 def weighed_shapes(shapes: Sequence[PressureShape], start: ProfileEstimate) -> list[Weighing]:
     """Fit the shapes, and weigh departures from each fit."""
-    count = float(start.outlier_weight.sum())
+    count = start.outlier_weight.sum()
     weighed = []
     for shape, fit in zip(shapes, fitted_shapes(shapes, start), strict=True):
         about = departure_basis(fit)
@@ -387,7 +387,7 @@ def posterior_of(
     variance = sum(np.diag(covariance)[:nodes] for covariance in covariances.values())
     gaussian = scan.stated_load * film * gaussian_transfer(model.k, estimate.gaussian.sigma)
     lost = _RESOLVED * np.sqrt(np.maximum(variance, 0.0)) > gaussian
-    resolved = model.k[int(np.argmax(lost)) if lost.any() else -1]
+    resolved = model.k[np.argmax(lost) if lost.any() else -1]
     return Posterior(
         estimate=estimate,
         state=scale * mean,
@@ -396,7 +396,7 @@ def posterior_of(
         changes=changes,
         film_inputs=names,
         nodes=nodes,
-        first_drift=nodes + int(estimate.points.free.sum()),
+        first_drift=nodes + estimate.points.free.sum(),
         residual=averaged.residual,
         found_noise=averaged.noise,
         noise_ratio=estimate.adopted_noise(averaged.noise) / estimate.noise_scale,

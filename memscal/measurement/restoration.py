@@ -320,7 +320,7 @@ def _compared(restored: Restoration, stress: BaseStress) -> StressComparison:
     else:
         spectrum = hankel_transform(stress.r, stress.sigma_zz, wavenumbers.k) / stress.load
     calculated = scan.stated_load * wavenumbers.synthesise(spectrum, restored.r)
-    peak = float(np.abs(calculated).max())
+    peak = np.abs(calculated).max()
     apart = np.abs(restored.sigma_zz - calculated)
     chi_square, degrees = _direct(restored, spectrum)
     return StressComparison(

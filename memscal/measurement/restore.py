@@ -68,7 +68,7 @@ def single_loads(scan: Scan) -> tuple[Scan, ...]:
     passes = scan.passes
     if scan.kind != "repeats" and not passes.any():
         return (replace(scan, load=_line_load(scan, scan.normal_load, "")),)
-    lines = range(int(passes.max()) + 1)
+    lines = range(passes.max() + 1)
     loads = np.array(
         [_line_load(scan, scan.normal_load[passes == i], f", line {i + 1}") for i in lines]
     )

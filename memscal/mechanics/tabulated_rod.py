@@ -70,7 +70,7 @@ def tabulated_rod(film: ElasticFilm, rod: Rod, load: float, *, sticking: bool) -
         return None
     rows, deepest = column
     scale = film.shear_modulus * film.thickness**2
-    depth = float(brentq(lambda d: _load(rows, d) - load / scale, 0.0, deepest, xtol=1e-12))
+    depth = brentq(lambda d: _load(rows, d) - load / scale, 0.0, deepest, xtol=1e-12)
     normal, shear = rows(np.cbrt(depth))[1:].reshape(2, -1) * load
     inside: Any = TabulatedField(base_wavenumbers(film), (normal, shear), rod.radius)
     loads = _load(rows, _STEPS * depth) * scale

@@ -58,7 +58,7 @@ def film_triangles(rings: FloatArray, *, radius: float, refinement: int = 1) -> 
     front = _Front(np.concatenate([inside, beyond[1:]]), sizes)
     while np.any(front.depth < 1.0):
         front.advance()
-    return TriangleMesh(np.array(front.points), np.array(front.triangles, dtype=np.int64))
+    return TriangleMesh(np.array(front.points), np.array(front.triangles, np.int64))
 
 
 @value_record
@@ -156,7 +156,7 @@ class _Front:
         share = (self.r[1:-1] - self.r[:-2]) / np.maximum(width[1:-1], self.r[-1] * 1e-300)
         room = np.pad((1 - share) * lower[:-2] + share * lower[2:] - self.depth[1:-1], 1)
         droppable = moving & (width > 0) & (width <= longest) & (room >= _ROOM * width)
-        kept = np.ones(self.r.size, dtype=bool)
+        kept = np.ones(self.r.size, bool)
         for i in np.flatnonzero(droppable):
             kept[i] = not kept[i - 1]
         return kept

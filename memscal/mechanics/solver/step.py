@@ -189,7 +189,7 @@ def _solve_system(problem: ContactProblem, status: _Status, goal: Goal) -> _Tria
     pressure[rows] = solution[: rows.size]
     shear[rows] = ratio * solution[: rows.size]
     shear[stuck] = solution[rows.size : -1]
-    depth = float(solution[-1]) * unit
+    depth = solution[-1] * unit
     w, u = problem.displacements(pressure, shear)
     return _Trial(pressure, shear, depth, problem.heights - depth + w, u)
 
@@ -308,7 +308,7 @@ def _revise(
         pressing = _bearing(problem, law, separation)
     stretch = status.stretch
     if not problem.interface.rigid:
-        settled &= bool(np.abs(p - status.pressure).max() <= _SETTLED * p.max())
+        settled &= np.abs(p - status.pressure).max() <= _SETTLED * p.max()
         length = problem.interface.slip_length
         stretch = np.clip(trial.outward - status.anchor, -length, length)
     return _Status(pressing, slip, status.anchor, separation, p, stretch), settled
