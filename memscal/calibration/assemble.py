@@ -106,6 +106,7 @@ def _configuration(
         centre = {"choice": choice, "chosen_by": "option" if request.centre else "test"}
         if solution.apart is not None:
             centre["p_value"] = solution.apart.p_value
+    u_load = solution.scans[0].load_uncertainty
     # A scan that was split by repeats or loads has one source.
     sources = {i: scan.source for i, scan in zip(solution.owners, solution.scans, strict=True)}
     further = [
@@ -118,6 +119,7 @@ def _configuration(
         "seed": request.seed,
         "options": options,
         "reference_unit": None if unit == "Pa" else unit,
+        "relative_load_uncertainty": u_load and u_load / solution.scans[0].stated_load,
         "free": prepared.thickness and prepared.thickness.record,
         "film_laws": laws and laws.record,
         "explanations": explanations or None,
