@@ -109,7 +109,7 @@ def with_slow_noise(solution: Solution) -> Solution:
     """Count what correlation the noise may have, where a scan states no noise."""
     estimate = solution.estimate
     rounding = estimate.noise_scale > estimate.weighed.noise
-    if rounding or estimate.points.u_errors is not None:
+    if rounding or estimate.points.noise_stated:
         return solution
     slow = slow_noise(estimate, residuals_of(estimate))
     return replace(solution, estimate=replace(estimate, slow=slow))

@@ -97,7 +97,7 @@ def quality_checks(
     yield from _field_shape(solution, results)
     yield from _set_up(solution)
     yield from _indentation(solution, results, assumed)
-    if estimate.points.u_errors is not None:
+    if estimate.points.noise_stated:
         yield noise_check(estimate.weighed.noise, estimate.points.channel)
     yield from _unexplained(estimate, results)
     yield _bayes_factor(estimate)
@@ -115,12 +115,12 @@ def _reconvolutions(solution: Solution) -> _Checks:
     )
     fitted = solution.gaussian_misfit
     p_value = None
-    if solution.estimate.points.u_errors is not None:
+    if solution.estimate.points.noise_stated:
         p_value = float(chdtrc(fitted.degrees, fitted.chi2_reduced * fitted.degrees))
     # Both are of the same points; the noise is stated, or is known by degrees of its own.
     limit = chi_square_limit(fitted.degrees)
     noise = solution.estimate.raster_noise
-    if noise is not None:
+    if noise:
         # What the noise was estimated from is a part of the misfit: the rest of it is independent.
         rest = max(fitted.degrees - noise.degrees, 1.0)
         limit = noise.degrees + rest * float(fdtri(rest, noise.degrees, 1 - FALSE_ALARM))
@@ -276,7 +276,7 @@ def _set_up(solution: Solution) -> _Checks:
     film = solution.scan.film
     sigma = estimate.gaussian.sigma
     source = solution.stress.form is not None
-    if film is not None and not source:
+    if film and not source:
         yield check(
             "width_over_thickness",
             sigma / film.thickness,
@@ -347,7 +347,7 @@ def _baseline(estimate: ProfileEstimate) -> _Checks:
 def _indentation(solution: Solution, results: Results, assumed: Sequence[Assumption]) -> _Checks:
     """Compare what a film's law would change, where nothing is counted for it, with u."""
     film = solution.scan.film
-    if film is None or film.law not in ("", LINEAR) or "model_form" in results.changes:
+    if not film or film.law not in ("", LINEAR) or "model_form" in results.changes:
         return
     laws = [assumption.sizes for assumption in assumed if assumption.name == "film_law"]
     if laws:
@@ -385,7 +385,7 @@ def _unexplained(estimate: ProfileEstimate, results: Results) -> _Checks:
         outcome = pure_error_test(estimate, model)
         compared = "with the scatter of repeats, as no noise is stated: an F ratio"
         noise = ""
-    if outcome is not None:
+    if outcome:
         yield _tested(
             "chi_square",
             outcome,
@@ -478,7 +478,7 @@ def _steadiness(solution: Solution) -> _Checks:
     """Test whether A, centre and baseline are the same at all loads, branches and repeats."""
     estimate = solution.estimate
     linear = model_tests.linearity_test(estimate)
-    if linear is not None:
+    if linear:
         yield added_check(
             "load_linearity",
             linear.fall,
@@ -490,7 +490,7 @@ def _steadiness(solution: Solution) -> _Checks:
     yield from _hysteresis(estimate)
     yield from _runs(estimate)
     apart = solution.apart
-    if apart is not None and not solution.per_repeat:
+    if apart and not solution.per_repeat:
         yield _tested(
             "repeat_centres",
             apart,
@@ -504,7 +504,7 @@ def _steadiness(solution: Solution) -> _Checks:
 def _hysteresis(estimate: ProfileEstimate) -> _Checks:
     """Compare approach with retreat where scans say which is which."""
     branches = hysteresis_test(estimate)
-    if branches is None:
+    if not branches:
         return
     reading = estimate.points.reading
     units = (
@@ -532,7 +532,7 @@ def _hysteresis(estimate: ProfileEstimate) -> _Checks:
 def _runs(estimate: ProfileEstimate) -> _Checks:
     """Compare the offset and the noise of each repeat and scan with those of the others."""
     runs = compare_runs(estimate)
-    if runs is None:
+    if not runs:
         return
     reading = estimate.points.reading
     largest = estimate.largest_signal
@@ -548,7 +548,7 @@ def _runs(estimate: ProfileEstimate) -> _Checks:
         "repeats by --centre per-repeat) takes that up, but not what else moved.",
         runs.offset.p_value,
     )
-    stated = "" if estimate.points.u_errors is None else ", each over what is stated"
+    stated = ", each over what is stated" if estimate.points.noise_stated else ""
     yield check(
         "noise_agreement",
         runs.noise.value**0.5,
@@ -583,11 +583,11 @@ def _held_out(estimate: ProfileEstimate) -> _Checks:
         "scan": "the scans are not of the same sensor, film and reference; calibrate each by "
         "itself and compare",
     }
-    stated = estimate.points.u_errors is not None
+    stated = estimate.points.noise_stated
     scale = "" if stated else ", over the others' own scatter as no noise is stated"
     for what in reversed(held_out.values()):
         worst = model_tests.hold_out(estimate, groups[what])
-        if worst is None:
+        if not worst:
             continue
         joined = "" if worst.alone else f", {what}s taken several at a time"
         yield _tested(

@@ -102,7 +102,7 @@ def diagnosed(
         some.append(measured.selected(np.arange(0, measured.u.size, step)))
     search = _Search(tuple(scans), tuple(stresses), tuple(some))
     error = search.error()
-    if error is not None:
+    if error:
         return error
     if isinstance(outcome, ProfileEstimate):
         return _hidden(outcome, search)
@@ -166,7 +166,7 @@ class _Trial:
 
     def explains(self, noise: float) -> bool:
         """Whether a sensor of some width fits, with a signal."""
-        if self.fit is None or not self.fit.has_width(self.weights, noise):
+        if not self.fit or not self.fit.has_width(self.weights, noise):
             return False
         variance = self.fit.covariance(self.weights, noise)[0, 0]
         return self.fit.conversion_constant > LEAST_SIGNIFICANCE * float(np.sqrt(variance))
@@ -212,7 +212,7 @@ class _Search:
         stretch = _grid(_LONGEST_SPAN * h / span)
         positions = _Length("positions", "/entry/data/x", 1.0, stretch)
         ideal = getattr(self.stresses[0], "ideal", None)
-        if ideal is not None:
+        if ideal:
             words = f"a {IDEAL[ideal.shape]} of the {ideal.shape}"
             return _Length(words, "--reference", ideal.size, 1 / stretch), positions
         if not all(isinstance(s, Contact) and isinstance(s.indenter, Rod) for s in self.stresses):
@@ -229,12 +229,12 @@ class _Search:
     def error(self) -> FitError | None:
         """Return the error that names the lengths at fault; ``None`` if none is."""
         trials = {length: self._coarse(length) for length in self.lengths}
-        fitted = [trial for trial in chain(*trials.values()) if trial.fit is not None]
+        fitted = [trial for trial in chain(*trials.values()) if trial.fit]
         if not fitted:
             return None
         # Where no noise is stated, it is that of the best fit.
         noise = 1.0
-        if self.points[0].u_errors is None:
+        if not self.points[0].noise_stated:
             noise = min(robust_scale(trial.residual, TINY) for trial in fitted)
         best = {length: self._refined(length, tried, noise) for length, tried in trials.items()}
         least = min(trial.loss(noise) for trial in best.values())
@@ -333,10 +333,10 @@ def _scaled(stress: BaseStress, path: str, factor: float) -> BaseStress:
         return press_rod(replace(film, law=LINEAR, mooney_rivlin_ratio=None), rod, _LOAD)
     profile = stress_table(stress)
     ideal = profile.ideal
-    if ideal is not None:
+    if ideal:
         return replace(profile, ideal=replace(ideal, size=ideal.size * factor))
     field = profile.field
-    if field is not None:
+    if field:
         return replace(profile, field=replace(field, x=field.x * factor, y=field.y * factor))
     shear = None if profile.sigma_rz is None else profile.sigma_rz / factor**2
     zz = profile.sigma_zz / factor**2

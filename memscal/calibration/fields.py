@@ -152,7 +152,7 @@ class RasterFields:
         if points.as_raster:
             lattice = even_lattice(points.x, points.y, points.places[0].count)
         even = lattice is not None
-        if lattice is None and divided:
+        if divided and not lattice:
             raise InputError(
                 f"The raster's {points.u.size} points are not evenly spaced: they lie on no "
                 "lattice of rows and columns within a tenth of its step.",
@@ -160,7 +160,7 @@ class RasterFields:
                 cure='Use method="bayesian" (--method bayesian) without a sweep, which needs no '
                 "lattice; or scan evenly.",
             )
-        if lattice is None:
+        if not lattice:
             steps = next(places.steps for places in points.places if all(places.steps))
             nowhere = np.zeros(0, np.intp)
             lattice = (
@@ -246,7 +246,7 @@ class RasterFields:
         finer = int(np.ceil(step / (2.0 / 3 * self.step))) | 1
         refinement = max(min(5, finer), least)
         fine, values = self.grid.refined(kernel, refinement)
-        if profile is not None:
+        if profile:
             values = self._lifted(profile.radial, fine)
         inside_x = np.abs(fine.x) <= self.support
         inside_y = np.abs(fine.y) <= self.support

@@ -28,7 +28,7 @@ from memscal.model.arrays import FloatArray, Values, value_record
 from memscal.model.bayes_factor import POSITIVE, STRONG, BayesFactor
 from memscal.model.checks import Message
 from memscal.model.film import LINEAR, NEO_HOOKEAN, ElasticFilm, law_in_words
-from memscal.model.notation import VOLTS, Reading, format_measured
+from memscal.model.notation import Reading, format_measured
 from memscal.model.quantities import MM
 from memscal.model.scan import Scan
 
@@ -53,7 +53,7 @@ class FilmLawComparison:
     laws: tuple[WeighedLaw, ...]
     reference: str
     loads: tuple[float, ...]  # in N
-    reading: Reading = VOLTS
+    reading: Reading
 
     def factor(self, law: WeighedLaw) -> BayesFactor:
         """Return the Bayes factor of the best law against one."""

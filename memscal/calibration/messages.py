@@ -43,9 +43,9 @@ def calibration_messages(
     channel = estimate.points.channel
     stress = solution.stress
     yield from quality.override_messages(prepared.overridden)
-    if laws is not None:
+    if laws:
         yield laws.message
-    if prepared.thickness is not None:
+    if prepared.thickness:
         yield from prepared.thickness.messages
     yield from _unstated_load(prepared, solution)
     yield from quality.failed_check_messages(checks)
@@ -70,12 +70,12 @@ def calibration_messages(
     if clipped:
         yield Message("at_ceiling", quality.at_ceiling_text(clipped))
     yield from point_messages(estimate)
-    if estimate.points.u_errors is None:
+    if not estimate.points.noise_stated:
         yield _noise(estimate, results)
     yield from _method(solution)
     yield from _form_of_g(results)
     form = stress.form
-    if form is not None:
+    if form:
         text = (
             f"The reference is a {form}, taken as exact: A is the reading over its unit, "
             f"{form.unit}. Film and rod do not enter: what they blur is in G."
@@ -87,7 +87,7 @@ def calibration_messages(
             "The reference states no convergence: its own error is not counted.",
         )
     counted = results.budget["conversion_constant"]
-    if form is None:
+    if not form:
         yield from _law(solution, results)
         yield from _unstated(solution, counted)
     yield from _assumed(assumptions, counted)
@@ -123,7 +123,7 @@ def _centres(solution: Solution) -> Message:
     reason = "as asked for (--centre per-repeat)"
     if loads_differ([scan.stated_load for scan in solution.scans]):
         reason = "as their loads differ, and with them the shape of the stress"
-    elif test is not None:
+    elif test:
         reason = f"as one centre has a p-value of {test.p_value:.1g} (--centre common takes one)"
     return Message(
         quality.REPEAT_CENTRES,
@@ -243,7 +243,7 @@ _INPUTS = (
 def _unstated(solution: Solution, counted: Container[str]) -> list[Message]:
     """Return which inputs that no assumption is about state no uncertainty."""
     film = solution.scan.film
-    if film is None:
+    if not film:
         return []
     if not any(source in counted for source in _INPUTS):
         text = "No uncertainty of film, rod and load is stated: ± counts noise alone."

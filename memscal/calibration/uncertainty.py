@@ -105,7 +105,7 @@ def input_effects(
             errors = hankel_transform(stress.r, stress.sigma_zz_errors, model.k) / stress.load
             blank = [np.zeros_like(errors) for _ in scans]
             changes.setdefault("reference_stress", blank)[i] = errors
-    if alternatives is not None:
+    if alternatives:
         pairs = zip(alternatives, model.references, strict=True)
         changes["model_form"] = [RECTANGLE * (other.values - own.values) for other, own in pairs]
     effects = {n: InputEffect(-signal_by(estimate, change)) for n, change in changes.items()}
@@ -131,7 +131,7 @@ def _taken_for_granted(scans: Sequence[Scan], estimate: ProfileEstimate) -> dict
     effects = {}
     for name, u in stated.items():
         influence = found.get({"position_scale": "stage_scale"}.get(name, name))
-        if influence is not None:
+        if influence:
             # The mean of a square is corrected; its standard deviation is left.
             change = u * influence.voltage + 2**0.5 * u**2 * influence.squared
             effects[name] = InputEffect(-change)
@@ -217,7 +217,7 @@ class Results:
     changes: Arrays  # (p,) by input: of the parameters, by one uncertainty of it
     budget: Mapping[str, Mapping[str, float]]  # standard uncertainties by parameter and source
     radial_covariance: FloatArray  # (n, n): covariance of G(r), in 1/m^4
-    cross_covariance: FloatArray  # (n, p): covariance of G(r) with the parameters, in their units
+    with_constant: FloatArray  # (n,): covariance of G(r) with A
     transfer_errors: FloatArray  # (m,): standard uncertainty of the transfer function
     radial_scatter: FloatArray  # (n,): u of G(r) by noise, baseline and inputs, in 1/m^2
     by_voltage: VoltageMap  # (p, n): derivatives of the parameters
@@ -288,7 +288,7 @@ def propagate(
     misfit = _misfit_columns(estimate, by_voltage[rows])
     columns["misfit"] = np.zeros((len(by_voltage), misfit.shape[1]))
     columns["misfit"][rows] = misfit
-    if drawn is not None:
+    if drawn:
         columns["noise"] = _drawn_columns(by_voltage, names, columns["noise"], drawn)
     independent = list(columns.values())
     count = len(names)
@@ -298,7 +298,7 @@ def propagate(
         scaled = [name.startswith("conversion_constant") for name in names]
         for (source, effect), column in zip(effects.items(), changes.T, strict=True):
             column[:count] += np.where(scaled, values, 0.0) * effect.scaling
-            if effect.exact is not None:
+            if effect.exact:
                 _replace_exactly(column, names, values, deconvolution, effect.exact, wavenumbers)
             columns[source] = column[:, None]
         independent.append(changes @ square_root(correlation_matrix(list(effects), correlations)))
@@ -318,7 +318,7 @@ def propagate(
         changes={source: columns[source][:count, 0] for source in effects},
         budget={name: _budget(names.index(name), columns, stored) for name in BUDGETED},
         radial_covariance=stored[count:, count:],
-        cross_covariance=stored[count:, :count],
+        with_constant=stored[count:, 0],
         transfer_errors=np.linalg.norm(everything[stop:], axis=1),
         radial_scatter=np.linalg.norm(scatter[count:stop], axis=1),
         by_voltage=by_voltage[:count],
@@ -333,11 +333,11 @@ def _effective_degrees(
 ) -> dict[str, float]:
     """Degrees of freedom of each uncertainty, of which an estimated noise alone has few."""
     # Welch and Satterthwaite: GUM (JCGM 100:2008), G.4.1.
-    if estimate.points.u_errors is not None:
+    if estimate.points.noise_stated:
         return {}
     readings = estimate.outlier_weight.sum() + estimate.points.curved.size
     degrees = max(readings - estimate.basis.flat, 1.0)
-    if estimate.raster_noise is not None:
+    if estimate.raster_noise:
         degrees = max(degrees, estimate.raster_noise.degrees)
     variances = np.diag(covariance)[: len(names)]
     shares = np.sum(noise[: len(names)] ** 2, axis=1) / variances
@@ -374,7 +374,7 @@ def _replace_exactly(
     # Those of centre, baseline and drift stay.
     same = exact.deconvolution.divided == deconvolution.divided
     other = exact.deconvolution if same else exact.other
-    assert other is not None
+    assert other
     r = deconvolution.g.r
     fit = exact.estimate.gaussian
     numbers, g = read_off(other, r)
@@ -436,7 +436,7 @@ def _parameters(
     radial = kernel[1 : 1 + g.r.size]
     functionals = kernel_functionals(g, deconvolution.gaussian_sigma, deconvolution.hidden)
     widths = radial.combined(np.stack([functional.row for functional in functionals]))
-    if division is not None:
+    if division:
         lost = functionals[1].row @ division.lost[1 : 1 + g.r.size]
         lost[0] -= functionals[1].row @ deconvolution.hidden
         widths = _corrected_full_width(widths, lost, estimate)
@@ -520,7 +520,7 @@ def _kernel_derivatives(
 ) -> tuple[_Derivatives, DivisionMap | None]:
     """Derivatives of A, G at its radii and its transfer function by either route."""
     estimate = solution.estimate
-    if not deconvolution.divided or solution.smoothed is None:
+    if not deconvolution.divided or not solution.smoothed:
         return _posterior_kernel(estimate, deconvolution, wavenumbers), None
     division = _division_map(solution, solution.smoothed, deconvolution, wavenumbers)
     # Centre, baseline and drift are parameters of the estimate.
@@ -607,10 +607,10 @@ def route_difference(solution: Solution, division: DivisionMap | None) -> float 
     # Of the division of the Bayesian fit's residuals: A's in standard deviations, or the root of
     # G's squared integral over its expectation, if that is larger.
     estimate = solution.estimate
-    if division is None or not solution.comparable:
+    if not (division and solution.comparable):
         return None
     divided = solution.deconvolution if solution.deconvolution.divided else solution.other
-    assert divided is not None
+    assert divided
     rings = ring_areas(divided.g.r)
     # A and G, without the transfer function.
     direct = division.direct[: 1 + rings.size]

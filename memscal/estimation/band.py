@@ -53,7 +53,7 @@ def find_band(estimate: ProfileEstimate, smoothed: SmoothedProfile | None) -> Ba
     error = np.maximum(transfer_uncertainty(estimate), TINY)
     clear = RELEVANT
     signal = np.abs((smoothed or estimate).spectrum.values)
-    if smoothed is None:
+    if not smoothed:
         noise = error * estimate.conversion_constant * reference
     elif estimate.points.as_raster:
         # Of all points of a raster the noise is equal at all wavenumbers.

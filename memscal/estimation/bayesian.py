@@ -426,7 +426,7 @@ def _choice(flat: int, sizes: tuple[int, ...], families: tuple[Family, ...]) -> 
     factors = np.zeros(places.shape)
     for row, (_, hypothesis) in enumerate(known):
         factor = hypothesis.strength
-        if hypothesis.family is None:
+        if not hypothesis.family:
             strength[row] = factor
             factor = 1.0
         else:
@@ -434,7 +434,7 @@ def _choice(flat: int, sizes: tuple[int, ...], families: tuple[Family, ...]) -> 
             family[row] = 1 + families.index(hypothesis.family)
             places[row, -1] = ends[-1] + 3 * family[row] - 1
             factors[row, -1] = 1.0
-        if hypothesis.shape is not None:
+        if hypothesis.shape:
             shape = SHAPES.index(hypothesis.shape)
             places[row, : sizes[shape]] = np.arange(ends[shape], ends[shape + 1])
             factors[row, : sizes[shape]] = factor

@@ -321,7 +321,7 @@ def departure_basis(
     families: tuple[FamilyFit, ...] = ()
     if not isinstance(angular, PlaneDepartures):
         rings = tuple(shape.rings(fit.width, fit.conversion_constant) for shape in SHAPES)
-        families = () if reduced is None else tuple(_fitted_families(reduced))
+        families = tuple(_fitted_families(reduced)) if reduced else ()
     flat = fit.jacobian.shape[1] + (angular.count if angular else 0)
     return DepartureBasis(fit.conversion_constant, fit.sigma, flat, rings, families, angular)
 

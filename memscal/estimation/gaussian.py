@@ -288,7 +288,7 @@ def fit_gaussian_to_points(
         chosen = some_points(model.points)
         some = replace(model, points=model.points.selected(chosen))
         start = fit_gaussian_to_points(some, weights[chosen])
-    theta = _robust_start(model, weights) if start is None else start.theta
+    theta = start.theta if start else _robust_start(model, weights)
     return _solve(model, weights, theta, robust)
 
 

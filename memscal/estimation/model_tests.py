@@ -62,8 +62,8 @@ def hold_out(estimate: ProfileEstimate, group: IndexArray) -> HeldOut | None:
     sizes = np.bincount(fold)
     ratios = {}
     for i in roots:
-        ratio = _predict(model.stated, roots, sizes, i, nuisances)
-        if ratio is not None:
+        ratio = _predict(estimate.points.noise_stated, roots, sizes, i, nuisances)
+        if ratio:
             ratios[i] = ratio
     folds = len(ratios)
     if folds < 2:
@@ -228,7 +228,7 @@ def _risen_above(estimate: ProfileEstimate, plateau: BoolArray) -> bool:
         outlier = np.ones_like(outlier)
     weights = np.where(plateau, _LITTLE, outlier / estimate.outlier_weight) * estimate.weights
     chosen = np.arange(plateau.size)
-    if plateau.size > 2 * _ENOUGH and points.decorrelation is None:
+    if plateau.size > 2 * _ENOUGH and not points.decorrelation:
         # Some of the plateau, and of the others.
         some = evenly(np.flatnonzero(plateau), _ENOUGH)
         others = evenly(np.flatnonzero(~plateau), _ENOUGH)
@@ -243,7 +243,7 @@ def _risen_above(estimate: ProfileEstimate, plateau: BoolArray) -> bool:
     reduced = ReducedScan.of(model, fit, weights, angular.components if angular else None)
     basis = departure_basis(fit, reduced, angular)
     count = (outlier * ~plateau)[chosen].sum()
-    least = 1.0 if points.u_errors is not None else NUMERICAL_FLOOR * estimate.largest_signal
+    least = 1.0 if points.noise_stated else NUMERICAL_FLOOR * estimate.largest_signal
     weighed = weigh_departures(reduced, basis, count, least_noise=least).average()
     # Mean over the plateau of the prediction less the voltage, and its standard uncertainty.
     share = plateau[chosen] / plateau[chosen].sum()

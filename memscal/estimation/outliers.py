@@ -61,7 +61,7 @@ def raster_noise(
     """Noise of one reading by its repeats, or by third differences of residuals (n,) in V."""
     # Both leave out what is smooth over the plane: a sensor that is not round adds nothing; and
     # points of little ``outlier`` weight.  ``None`` where noise is stated, or of too few of either.
-    if points.u_errors is not None or not points.planar:
+    if points.noise_stated or not points.planar:
         return None
     ordinary = np.flatnonzero(outlier >= OUTLIER_WEIGHT)
     group = grouped(points.scan, points.place_numbers("index"), points.load)[ordinary]

@@ -133,6 +133,11 @@ class ScanPoints:
         return channel_order(self.channel)
 
     @property
+    def noise_stated(self) -> bool:
+        """Whether the voltages state their noise."""
+        return self.u_errors is not None
+
+    @property
     def positions(self) -> FloatArray:
         """Positions of the indenter along x and y, shape (2, n), in m."""
         return np.stack([self.x, self.y])
@@ -248,7 +253,7 @@ class ScanPoints:
         """Scale rows, (n,) or (n, m), by the root of their weights, and decorrelate them."""
         place = None if out is None else out.T
         scaled: FloatArray = np.multiply(values.T, np.sqrt(weights), out=place).T
-        return scaled if self.decorrelation is None else self.decorrelation.apply(scaled)
+        return self.decorrelation.apply(scaled) if self.decorrelation else scaled
 
     def sharing(self, changes: FloatArray) -> tuple[ScanPoints, float]:
         """Return the points with further errors in common, and what these add to ln det.
@@ -271,17 +276,17 @@ class ScanPoints:
         place = grouped(self.owner, self.anew * self.repeat, self.y, self.x)
         share = moved * np.sqrt(stated)
         share[np.bincount(place)[place] == 1] = 0.0
-        if self.u_errors is None or not share.any():
+        if not (self.noise_stated and share.any()):
             return self
         # The variance counts all errors: what is a reading's own is left of it.
         own = np.sqrt(1 - share**2)
         every = np.arange(place.size)
         known = self.decorrelation
-        root = own[None] if known is None else own[:, None] * known.correlate(np.eye(every.size))
+        root = own[:, None] * known.correlate(np.eye(every.size)) if known else own[None]
         points = replace(self, decorrelation=Decorrelation(((every, root),)))
         columns = csr_array((share, (every, place)))
-        if known is not None:
-            assert points.decorrelation is not None
+        if known:
+            assert points.decorrelation
             return points.sharing(points.decorrelation.apply(columns.toarray()))[0]
         # No reading has two positions: the columns are orthogonal.
         square = np.bincount(place, (share / own) ** 2)
@@ -292,7 +297,7 @@ class ScanPoints:
 
     def unstandardise(self, columns: FloatArray, weights: FloatArray) -> FloatArray:
         """Apply the transposed standardisation to columns (n, m), which are overwritten."""
-        if self.decorrelation is not None:
+        if self.decorrelation:
             columns = self.decorrelation.adjoint(columns)
         columns *= np.sqrt(weights)[:, None]
         return columns

@@ -137,10 +137,10 @@ class ProfileEstimate:
 
     def adopted_noise(self, scatter: float) -> float:
         """Noise of a point of weight one: stated uncertainties are adopted until exceeded."""
-        if self.raster_noise is not None:
+        if self.raster_noise:
             scatter = self.raster_noise.deviation
         scatter = max(scatter, NUMERICAL_FLOOR * self.largest_signal)
-        return max(scatter, 1.0) if self.points.u_errors is not None else scatter
+        return max(scatter, 1.0) if self.points.noise_stated else scatter
 
     @cached_property
     def kernel(self) -> FloatArray:
@@ -262,7 +262,7 @@ def _root(numbers: VoltageMap, noise: FloatArray, factor: Decorrelation | None) 
     if noise.size > DENSE:
         return square_root(numbers.covariance(noise, factor))
     scaled = noise * numbers.dense()
-    return scaled if factor is None else factor.correlate_adjoint(scaled.T).T
+    return factor.correlate_adjoint(scaled.T).T if factor else scaled
 
 
 def estimate_profile(
@@ -358,17 +358,16 @@ def _weighed(
     free = plane_departures(spots, fit, (reduced.data, reduced.flat, reduced.components), noise)
     free_basis = departure_basis(fit, reduced, free)
     free_weighing = bayesian.weigh_departures(reduced, free_basis, **noises)
-    if free_weighing.evidence < about_centre.evidence + _CLEARLY:
-        return basis, about_centre.average()
-    weighed = free_weighing.average()
-    # Noise that grows with the signal, as by errors of the stage, would be taken for G.
-    left = fit.points.standardised(weighed.residual, weights)
-    signal = fit.jacobian[:, 0]
-    variance = variances_nearby(fit.points, left)[signal > _SEEN * signal.max()].mean()
-    if variance > _EVEN * noise**2:
-        return basis, about_centre.average()
-    found = about_centre.log_marginals
-    return free_basis, replace(weighed, log_marginals=found, free=free_weighing.evidence)
+    if free_weighing.evidence >= about_centre.evidence + _CLEARLY:
+        weighed = free_weighing.average()
+        # Noise that grows with the signal, as by errors of the stage, would be taken for G.
+        left = fit.points.standardised(weighed.residual, weights)
+        signal = fit.jacobian[:, 0]
+        variance = variances_nearby(fit.points, left)[signal > _SEEN * signal.max()].mean()
+        if variance <= _EVEN * noise**2:
+            found = about_centre.log_marginals
+            return free_basis, replace(weighed, log_marginals=found, free=free_weighing.evidence)
+    return basis, about_centre.average()
 
 
 def log_marginal_likelihood(
@@ -391,7 +390,7 @@ def log_marginal_likelihood(
     reduced = ReducedScan.of(model, fit, weights, angular.components if angular else None)
     basis = departure_basis(fit, reduced, angular)
     least = _least_noise(fit)
-    if estimate.raster_noise is not None:
+    if estimate.raster_noise:
         least = max(least, estimate.raster_noise.deviation)
     count = estimate.outlier_weight.sum()
     weighing = bayesian.weigh_departures(reduced, basis, count, least_noise=least)
@@ -416,7 +415,7 @@ def gaussian_log_marginal(estimate: ProfileEstimate, fit: GaussianFit) -> float:
 
 def _least_noise(fit: GaussianFit) -> float:
     """Least noise of a point of weight one: as stated, or beyond rounding (V)."""
-    if fit.points.u_errors is not None:
+    if fit.points.noise_stated:
         return 1.0
     return NUMERICAL_FLOOR * float(np.abs(fit.predicted).max())
 

@@ -42,7 +42,6 @@ class FreeModel:
     data: FloatArray
     design: FloatArray  # (m, r): weighted columns of the flat parameters, then of the departures
     point: IndexArray  # (m,): which points of the scan they are
-    stated: bool  # whether the noise is stated
 
     @cached_property
     def basis(self) -> FloatArray:
@@ -94,13 +93,13 @@ def free_model(estimate: ProfileEstimate, *, clip_outliers: bool = False) -> Fre
     rings = np.hstack([around, rings @ mixed])
     base = np.linalg.qr(flat)[0]
     left, singular, _ = np.linalg.svd(rings - base @ (base.T @ rings), full_matrices=False)
-    stated = points.u_errors is not None
-    resolved = singular > _SHARE_OF_NOISE * (1.0 if stated else estimate.noise_scale)
+    noise = 1.0 if points.noise_stated else estimate.noise_scale
+    resolved = singular > _SHARE_OF_NOISE * noise
     design = np.hstack([flat, left[:, resolved] * singular[resolved]])
     design = q @ design
     del q
     design = design if ordinary.all() else design[point]
-    return FreeModel(data, design, point, stated)
+    return FreeModel(data, design, point)
 
 
 #: Weight of the correlation from one step to the next: half as much for each step farther.
@@ -157,7 +156,8 @@ def residuals_of(estimate: ProfileEstimate, model: FreeModel | None = None) -> R
     basis = model.basis[order]
     values = model.left_over[order]
     degrees = basis.shape[0] - basis.shape[1]
-    return Residuals(values, basis, point, place[point], sequence[point], model.stated, degrees)
+    stated = points.noise_stated
+    return Residuals(values, basis, point, place[point], sequence[point], stated, degrees)
 
 
 def chi_square_test(residuals: Residuals) -> TestOutcome:
@@ -174,7 +174,7 @@ def pure_error_test(estimate: ProfileEstimate, model: FreeModel) -> TestOutcome 
     points = estimate.points
     keys = (points.scan, points.place_numbers("index"), points.load)
     group = grouped(*(key[model.point] for key in keys))
-    if points.decorrelation is not None or group.max() + 1 == group.size:
+    if points.decorrelation or group.max() + 1 == group.size:
         return None
     weight = np.sqrt(estimate.weights / estimate.outlier_weight)[model.point]
     square = np.bincount(group, weight**2)

@@ -84,7 +84,7 @@ def repeat_centres_test(estimate: ProfileEstimate) -> CentresApart | None:
     shifted = np.diff(scan, prepend=-1) == 0
     shifts = own[:, shifted] * points.along(shift)[:, None]
     fit = _Fit.of(estimate, np.hstack([own, own * along, shifts]))
-    if fit is None:
+    if not fit:
         return None
     places = np.zeros(count)
     moved = fit.coefficients[-shifts.shape[1] :]
@@ -131,7 +131,7 @@ def hysteresis_test(estimate: ProfileEstimate) -> BranchesApart | None:
     if both.any():
         columns += [both * points.along(model.shift_derivative(geometry, estimate.kernel)), both]
     fit = _Fit.of(estimate, sign[:, None] * np.stack(columns, axis=1))
-    if fit is None:
+    if not fit:
         return None
     values = fit.coefficients[-len(columns) :]
     rows = fit.root[-len(columns) :]
@@ -198,7 +198,7 @@ def compare_runs(estimate: ProfileEstimate) -> RunsApart | None:
         return None
     own = np.eye(count)[number]
     fit = _Fit.of(estimate, np.hstack([own[:, 1:] * estimate.signal[:, None], own]))
-    if fit is None:
+    if not fit:
         return None
     # A run's baseline is its scan's and its own, whatever share of both is which.
     straight = 1 + points.free.sum(axis=1)

@@ -210,7 +210,7 @@ def _draw_points(
     x = np.asarray(scan.offset_x)
     y = np.asarray(scan.offset_y)
     lattice = even_lattice(x, y, x.size)
-    if lattice is None:
+    if not lattice:
         return axes.scatter(x / MM, y / MM, _DOTS / x.size, values, lw=0, **look)
     along, across = lattice
     nodes = [(a.start + a.step * np.arange(a.index.max() + 1)) / MM for a in lattice]
@@ -332,12 +332,12 @@ def _setting(data: ApparatusData, loads: Loads) -> str:
     film = data.film
     rod = data.indenter
     parts = []
-    if rod is not None:
+    if rod:
         load = f", {data.load:.3g} N" if data.load else ""
         if len(loads) > 1:
             load = f", {loads[0][0]} to {loads[-1][0]}"
         parts.append(f"{rod.shape} of radius {rod.radius / MM:.3g} mm{load}")
-    if film is not None:
+    if film:
         modulus = f"E = {film.young_modulus / KPA / 1e3:.3g} MPa"
         law = f", {film.law_text}" if film.law else ""
         elasticity = f"{modulus}, ν = {film.poisson_ratio:.3g}{law}"

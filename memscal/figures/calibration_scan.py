@@ -208,7 +208,7 @@ def _draw_reference(axes: Axes, data: ApparatusData, *, net: bool = False) -> Fl
     reference = data.reference
     constant = data.conversion_constant
     stress = _seen_stress(data)
-    curved = data.film is not None and data.film.law not in ("", LINEAR)
+    curved = data.film and data.film.law not in ("", LINEAR)
     # Of a curved law the stress at another load has another shape.
     other = curved and data.load and loads_differ((data.load, reference.load))
     # A point is nothing beside its axis.

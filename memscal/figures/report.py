@@ -363,14 +363,14 @@ def _provenance(report: Report) -> list[Table]:
     """Return program, files, options and versions."""
     process = report.process
     rows = []
-    if process is not None:
+    if process:
         rows = [("program", f"{process.program} {process.version}"), ("date", process.date)]
     for name, source in report.files.items():
-        if source is not None:
+        if source:
             rows.append((f"input {name}", source.file_name))
             rows.append((f"its SHA-256 ({name})", source.sha256))
     tables = [Table("What was run on what", ("item", "value"), rows)]
-    if process is not None:
+    if process:
         tables.append(_named_values("Options", process.configuration))
         tables.append(_named_values("Versions", process.environment))
     return tables

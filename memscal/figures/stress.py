@@ -128,7 +128,7 @@ def _draw_stress(axes: Axes, restored: Restoration) -> None:
     label = r"blurred again, $S_{zz} = G*\sigma_{zz}$"
     axes.plot(r, blurred, color=GAUSSIAN, ls="-.", label=label)
     compared = restored.comparison
-    if compared is not None:
+    if compared:
         label = "expected"
         if isinstance(compared.stress, Contact):
             friction = compared.stress.friction

@@ -116,10 +116,10 @@ def _grid(
         row = []
         for load in loads.tolist():
             nearest = _nearest(tables, mu, load)
-            if nearest is None:
-                missing.append(f"{load:g} N with friction {mu:g}")
-            else:
+            if nearest:
                 row.append(nearest)
+            else:
+                missing.append(f"{load:g} N with friction {mu:g}")
         grid.append(row)
     if missing:
         stated = ", ".join(f"{load:g}" for load in sorted({table.load for _, table in tables}))

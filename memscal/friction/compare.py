@@ -246,7 +246,7 @@ def compare(
     require_non_negative("gain between scans", between_scan_gain)
     beside = {None: lubricated_friction, FRICTIONLESS: 0.0, APART: None}[lubricated]
     require_contacts(scans_of(opened))
-    _require_few(opened, [one.sensor.channel for one in (sensor, tangential) if one is not None])
+    _require_few(opened, [one.sensor.channel for one in (sensor, tangential) if one])
     measured = _measured(opened, sensor, override)
     setting = _setting(measured, cache, workers)
     if sensor.order:
@@ -258,15 +258,15 @@ def compare(
                 cure="Leave out references, lubricated, shear and macroscopic, or give that of zz.",
             )
         return _compared_by_shear(measured, sensor, setting, friction, loading, override)
-    if tangential is not None and references is not None:
+    if tangential and references is not None:
         problem = "Profiles of another program and the shear are asked for."
         raise InputError(problem, cure="Leave one of them out: those profiles have no shear.")
-    notes = [] if tangential is None else _accept_tangential(measured, tangential, override)
+    notes = _accept_tangential(measured, tangential, override) if tangential else []
 
     # Calculate the contacts, by the definition of their loading.
     families = _families(setting, friction, loading, references)
     shear_families = None
-    if tangential is not None:
+    if tangential:
         shear_families = _families(setting, friction, loading, order=1)
 
     # Fit and check.
@@ -281,7 +281,7 @@ def compare(
         shear_families=shear_families,
         macroscopic=sliding,
     )
-    if comparison.unexplained and references is None and tangential is None:
+    if comparison.unexplained and references is None and not tangential:
         first, *_ = channels_of(measured, sensor, families, (), between_scan_gain).values()
         # At three times the loads a contact may have no solution.
         with suppress(MemscalError):
@@ -302,7 +302,7 @@ def compare(
     # Record.
     altered = accepted_alterations(*(profile.source for profile in references or ()))
     messages = [*override_messages(altered), *comparison.messages, *notes]
-    if laws is not None:
+    if laws:
         messages += laws.messages
     return replace(comparison, interface=laws, messages=tuple(messages))
 
@@ -433,7 +433,7 @@ def compare_measured(
     channels = channels_of(measured, apparatus, families, (), between_scan_gain)
     fits = {loading: fit_friction(channel) for loading, channel in channels.items()}
     joint_fits = fits
-    if shear is not None and shear_families is not None:
+    if shear and shear_families:
         common = common_inputs(apparatus, shear)
         normal = channels_of(measured, apparatus, families, common, between_scan_gain)
         sheared = channels_of(measured, shear, shear_families, common, between_scan_gain)
@@ -446,7 +446,7 @@ def compare_measured(
     differences = []
     for pair in lubricated_pairs(measured.profiles):
         difference = dry_against_lubricated(measured, frictionless, pair)
-        if difference is not None:
+        if difference:
             differences.append(difference)
 
     stated = measured.noise_stated

@@ -122,7 +122,7 @@ def load_points(profile: MeasuredProfile, channel: str = "zz") -> LoadPoints:
             cure="Make it again with memscal apply, or give the scans.",
         )
     require_line(profile.label, profile.x, profile.y)
-    if points is None:
+    if not points:
         raise InputError(
             f"{profile.label}: the measured stress holds no usable voltage u_{channel}.",
             why="The scan has none, or it does not change, or the scan does not run along "
@@ -397,7 +397,7 @@ class Noise:
 
     kinds: Arrays  # (V, n): standard deviations in V
     # (m, m): correlation of kinds within each m readings that follow each other, if there is any.
-    shared: Arrays = field(default_factory=dict)
+    shared: Arrays
 
     def inverse_root(self) -> FloatArray:
         """Return W, with W N W^T = 1, in B blocks of readings that share noise: (V, B, m, m)."""

@@ -355,12 +355,12 @@ def measured_profile(
     s_zz = averaged[order] / a
     average = average[order]
     decorrelation = restored.points.decorrelation
-    if decorrelation is None:
-        noise_root = np.sqrt(average.power(2) @ noise**2)
-    else:
+    if decorrelation:
         # Of repeats there are more columns than positions.
         correlated = noise[:, None] * decorrelation.correlate(np.eye(noise.size))
         noise_root = np.linalg.qr((average @ correlated).T)[1].T
+    else:
+        noise_root = np.sqrt(average.power(2) @ noise**2)
     u_a = restored.apparatus.parameters.uncertainty("conversion_constant")
     roots = {"noise": noise_root / a, "conversion_constant": u_a / a * s_zz[:, None]}
     roots |= _place_roots(restored, average)
@@ -414,7 +414,7 @@ def _channel_points(
     if scan.normal_load_errors is not None:
         load_errors = np.nan_to_num(scan.normal_load_errors[measured_mask(scan, points.channel)])
     correlation = None
-    if points.decorrelation is not None:
+    if points.decorrelation:
         root = points.decorrelation.correlate(np.eye(points.u.size))
         correlation = root @ root.T
     return MeasuredPoints(

@@ -445,7 +445,7 @@ def shared_changes(
     """
     known = apparatus.film
     names = list[str]()
-    if known is not None and all(scan.film and _alike(scan.film, known) for scan in scans):
+    if known and all(scan.film and _alike(scan.film, known) for scan in scans):
         names += _FILM_PROPERTIES
     if all(scan.load_cell.same_as(apparatus.load_cell) for scan in scans):
         names.append("load")

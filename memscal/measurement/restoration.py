@@ -215,8 +215,9 @@ class Restoration(Result, Checked):
         A stated noise is used as it is, with what uncertain positions add to it.
         """
         estimate = self.posterior.estimate
-        stated = self.points.u_errors is not None
-        noise = estimate.noise / estimate.noise_scale if stated else self.noise
+        noise = self.noise
+        if self.points.noise_stated:
+            noise = estimate.noise / estimate.noise_scale
         return float(np.sum(estimate.outlier_weight * (self.residual / noise) ** 2))
 
     @property
@@ -355,7 +356,7 @@ def _direct(restored: Restoration, spectrum: FloatArray) -> tuple[float, int]:
     shifts = (posterior.shifts["apparatus"], posterior.shifts["position_scale"], by_load)
     # The stated noise as it is: raised by a misfit, it would hide it.
     noise = posterior.noise_ratio * estimate.noise_scale
-    if points.u_errors is not None:
+    if points.noise_stated:
         noise = 1.0
     weights = estimate.weights / noise**2
     points, _ = points.sharing(points.standardised(np.hstack(shifts), weights))

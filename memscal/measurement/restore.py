@@ -96,7 +96,7 @@ def scan_at_load(scan: Scan, load: float) -> Scan:
 
 def place_of(scan: Scan) -> str:
     """Name a scan's file, for messages."""
-    return "The scan" if scan.source is None else scan.source.file_name
+    return scan.source.file_name if scan.source else "The scan"
 
 
 def load_of(scan: Scan) -> str:
@@ -253,7 +253,7 @@ def _checks(restored: Restoration) -> Iterator[QualityCheck]:
     yield _symmetry(restored)
     yield outlier_check(restored.posterior.estimate.outlier_weight, "the residuals")
     compared = restored.comparison
-    if compared is not None:
+    if compared:
         yield check(
             "expected_stress",
             compared.chi_square,
@@ -277,7 +277,7 @@ def force_less_load(
 
 
 def _noise(restored: Restoration) -> Iterator[QualityCheck]:
-    if restored.points.u_errors is None:
+    if not restored.points.noise_stated:
         return
     yield noise_check(restored.posterior.found_noise)
     residuals = residuals_of(restored.posterior.estimate)
@@ -318,7 +318,7 @@ def _messages(restored: Restoration, checks: Sequence[QualityCheck]) -> Iterator
     yield from failed_check_messages(checks)
     yield from failed_calibration_messages(restored.apparatus)
     yield from point_messages(restored.posterior.estimate)
-    if restored.points.u_errors is None:
+    if not restored.points.noise_stated:
         yield noise_unstated_message(restored.points.reading.text(restored.noise.min()))
     if not restored.apparatus.radial_profile.g_errors.any():
         yield Message(

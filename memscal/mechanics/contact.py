@@ -185,7 +185,7 @@ class Contact(Result):
     def mesh(self) -> FieldMesh:
         """Return displacement and stress in the whole film, on the mesh of its finite elements."""
         mesh: Callable[[], FieldMesh] | None = getattr(self.inside, "mesh", None)
-        if mesh is None:
+        if not mesh:
             raise InputError(
                 f'A contact that was solved with backend="{self.backend}" has no mesh.',
                 cure='Press the indenter with backend="fem".',

@@ -178,7 +178,7 @@ def indent(
     )
     slides_or_sticks = friction == 0 or math.isinf(friction)
     # Without friction there is nothing for a slip length to act on.
-    rigid = interface.rigid or (friction == 0 and interface.normal_law is None)
+    rigid = interface.rigid or (friction == 0 and not interface.normal_law)
     if strain == "finite":
         contacts = hook("press_at_finite_strain")(request)
     elif isinstance(indenter, Rod) and slides_or_sticks and rigid and backend == "hankel":

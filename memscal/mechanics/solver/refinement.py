@@ -233,7 +233,7 @@ def _contact_radius(request: RingRequest, rings: FloatArray, state: ContactState
     if isinstance(request.indenter, Rod):
         return request.indenter.radius
     p = state.pressure
-    if request.interface.normal_law is not None:
+    if request.interface.normal_law:
         # Without an edge: where the pressure has fallen to a small share of its largest.
         last = np.flatnonzero(p > _EDGE * p.max())[-1]
         share = (p[last] - _EDGE * p.max()) / (p[last] - p[last + 1])

@@ -166,7 +166,7 @@ def _solve_system(problem: ContactProblem, status: _Status, goal: Goal) -> _Tria
         matrix[-1, : rows.size] = c.areas[rows] * scale
         right[-1] = goal.value * scale
     law = problem.interface.normal_law
-    if law is not None:
+    if law:
         # g = 0 becomes g = F^-1(p), linearised at the trial's separation.
         gap = status.separation[rows]
         stiffness = law.stiffness(gap, problem.film)
@@ -238,7 +238,7 @@ def take_step(
     law = problem.interface.normal_law
     pressing = start.touching.copy()
     separation = np.zeros_like(problem.heights)  # counts where the interface is compliant alone
-    if law is not None:
+    if law:
         separation = problem.separations(start)
         pressing = _bearing(problem, law, separation)
     held = goal.ring if isinstance(goal, Touch) else None
@@ -288,7 +288,7 @@ def _revise(
     slip = _revised_slip(problem, status, trial, careful)
     settled = np.array_equal(slip, status.slip)
     law = problem.interface.normal_law
-    if law is None:
+    if not law:
         # Let go of rings that pull, and catch rings that would pass through the indenter.
         pull = -p / np.abs(p).max(initial=1e-300)
         overlap = -separation / max(abs(trial.depth), 1e-300)
