@@ -167,7 +167,7 @@ def _reconvolution(solution: Solution) -> Reconvolution:
         # Repeats of one line are shown with their centres at that of the first.
         axis = np.argmax(points.free[0])
         place = estimate.offset[axis] + estimate.centre[axis]
-    elif points.scans > 1 and estimate.points.order:
+    elif points.scans > 1 and points.order:
         # The sign of a shear depends on the side.
         place = estimate.offset[estimate.model.axis]
     elif points.scans > 1 or points.planar:

@@ -43,8 +43,8 @@ def drawn_scatter(solution: Solution) -> DrawnScatter | None:
     failure = ""
     method: Any = solution.method
     seeded = is_dataclass(method) and hasattr(method, "seed")
-    weighed = solution.estimate.weighed
     estimate = solution.estimate
+    weighed = estimate.weighed
     model = estimate.model
     predicted = estimate.predicted
     for _ in range(count):

@@ -53,8 +53,7 @@ def choose_grid(estimate: ProfileEstimate, band: Band) -> GridChoice:
     last = estimate.model.k[closed[0] if closed.size else -1]
     spacing = min(estimate.gaussian.width / _POINTS_PER_WIDTH, np.pi / (2 * last))
     spacing = float(support / (_COUNTED * np.ceil(support / spacing / _COUNTED)))
-    span = max(np.ptp(offset) for offset in estimate.offset)
-    extent = max(span, 1.25 * support)
+    extent = max(1.25 * support, *map(np.ptp, estimate.offset))
     reasons = {
         "spacing": f"{spacing * 1e3:.4g} mm: {_POINTS_PER_WIDTH:g} points per Gaussian "
         "width, and the last wavenumber is at least twice the one where the window has closed",
@@ -250,8 +249,8 @@ class RasterFields:
             values = self._lifted(profile.radial, fine)
         inside_x = np.abs(fine.x) <= self.support
         inside_y = np.abs(fine.y) <= self.support
-        plane = values[np.ix_(inside_y, inside_x)]
-        return Field(Lattice(fine.x[inside_x], fine.y[inside_y]), plane)
+        inside = np.ix_(inside_y, inside_x)
+        return Field(Lattice(fine.x[inside_x], fine.y[inside_y]), values[inside])
 
 
 @lru_cache(maxsize=6)

@@ -250,8 +250,7 @@ def require_free(
             cure="State it (memscal import --thickness-uncertainty, or "
             "/entry/sample/film/thickness_uncertainty).",
         )
-    references = [*stated, *(scan.reference for scan in scans)]
-    if any(reference is not None for reference in references):
+    if any(stated) or any(scan.reference for scan in scans):
         raise InputError(
             "A reference is given, of one thickness.",
             why="To estimate the thickness the rod is solved on films of others.",

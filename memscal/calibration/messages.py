@@ -189,8 +189,9 @@ def _law(solution: Solution, results: Results) -> Iterator[Message]:
     parameters = results.parameters
     rows = [parameters.names.index(name) for name in MOVED[:2]]
     if law == LINEAR:
-        text = "The film is taken as linear elastic, as stated; no other law is counted."
-        yield Message("film_law", text)
+        yield Message(
+            "film_law", "The film is taken as linear elastic, as stated; no other law is counted."
+        )
         return
 
     def changed(by: str) -> str:

@@ -252,9 +252,10 @@ class Solution:
     @cached_property
     def other(self) -> Deconvolution | None:
         """A and G by the other route, if it is open: Bayesian beside a division, or back."""
+        if not self.comparable:
+            return None
         other = WhiteNoise() if isinstance(self.method, Bayesian) else Bayesian()
-        steps = self.estimate, self.band, self.fields, other
-        return deconvolve(*steps) if self.comparable else None
+        return deconvolve(self.estimate, self.band, self.fields, other)
 
     @property
     def on_films(self) -> bool:

@@ -161,8 +161,7 @@ def angular_departures(
     free = by_rings @ amplitudes
     free -= base @ (base.T @ free)
     data -= base @ (base.T @ data)
-    strengths = _expected_strengths(free, data, order)
-    return AngularDepartures(rings, amplitudes * strengths[order])
+    return AngularDepartures(rings, amplitudes * _expected_strengths(free, data, order)[order])
 
 
 def _unit_amplitudes(radius: FloatArray, width: float) -> list[FloatArray]:

@@ -5,8 +5,6 @@ on a grid, and at the points by quintic splines through it; its slopes are the s
 :math:`i k_x \hat U`.  The grid is longer than scan and field, so that nothing wraps around.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cached_property
 from typing import Any, ClassVar, cast

@@ -212,8 +212,7 @@ class ForwardModel:
     @cached_property
     def curvature_columns(self) -> FloatArray:
         """Parabola of each scan whose baseline may be curved, shape (n, c)."""
-        inside = np.equal.outer(self.points.scan, self.points.curved)
-        return self.parabola[:, None] * inside
+        return self.parabola[:, None] * np.equal.outer(self.points.scan, self.points.curved)
 
     @cached_property
     def _within(self) -> FloatArray:
@@ -259,8 +258,7 @@ class ForwardModel:
         offset = self.offset(centres)
         radius = np.hypot(*offset)
         towards = -offset / np.where(radius > 0, radius, 1.0)
-        across = self.reference.order == ACROSS
-        return Geometry(radius, towards, self.k, across, self.reach)
+        return Geometry(radius, towards, self.k, self.reference.order == ACROSS, self.reach)
 
     def signal(self, geometry: Geometry, kernel: FloatArray) -> FloatArray:
         """Voltages for kernels in V/Pa by their transforms, shape (nodes,) or (nodes, m)."""

@@ -3,8 +3,6 @@
 It is fitted by weighted least squares, with A, centre, baseline and linear drift.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -106,8 +104,7 @@ _SOURCE_WIDTHS = 8
 
 def some_points(points: ScanPoints) -> IndexArray:
     """Numbers of the points that are fitted at first, evenly chosen along the scans."""
-    order = np.lexsort((points.x, points.y, points.scan))
-    return np.sort(evenly(order, MOST_AT_START))
+    return np.sort(evenly(np.lexsort((points.x, points.y, points.scan)), MOST_AT_START))
 
 
 def _robust_start(model: ForwardModel, weights: FloatArray) -> FloatArray:
@@ -133,9 +130,8 @@ def _robust_start_of_scan(model: ForwardModel, weights: FloatArray) -> ArrayTrip
     if model.reference.source:
         # A source may be far narrower than G.
         widths = np.geomspace(0.5 * points.step, 0.25 * points.span, _SOURCE_WIDTHS)
-    kernels = gaussian_transfer(model.k[:, None], widths)
     # Profiles per newton of every width, on a table for quick trials.
-    spectra = model.reference.values[:, None] * kernels
+    spectra = model.reference.values[:, None] * gaussian_transfer(model.k[:, None], widths)
     wavenumbers = model.reference.wavenumbers
     tables = wavenumbers.synthesise(spectra, radii, order=model.reference.order).T
     root = np.sqrt(weights)

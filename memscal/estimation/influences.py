@@ -7,8 +7,6 @@ its base carries :math:`T = 2(\sinh x + x\cosh x)/(\sinh 2x + 2x)`, x = kh, of a
 Fourier Transforms, 1951), in place of what a bonded one does.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Outliers and noise of a scan's points by their residuals: robust scales, weights, neighbours."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

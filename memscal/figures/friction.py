@@ -166,8 +166,7 @@ def comparison_figure(
         draw_profiles(profiles, comparison, loads)
         _draw_maxima(maxima, comparison, loads[0].loading)
         best = joint_estimate(comparison, loads).best
-        largest = draw_residuals(residuals, comparison, loads, best)
-        share_limits([residuals], largest)
+        share_limits([residuals], draw_residuals(residuals, comparison, loads, best))
         profiles.set_xlabel(ALONG_RADIUS)
         residuals.set_xlim(profiles.get_xlim())
         _draw_effective(effective, comparison, loads)

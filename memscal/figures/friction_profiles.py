@@ -160,11 +160,10 @@ def profile_figure(comparison: FrictionComparison, lubrication: str) -> Figure:
     with panels_of(4.6, 2, 2, height_ratios=(2.2, 1), sharex=True) as (figure, panels):
         draw_profiles(panels[0, 0], comparison, loads)
         draw_profiles(panels[0, 1], comparison, loads, logarithmic=True)
-        largest = 0.0
-        for axes, index in zip(panels[1], (0, -1), strict=True):
-            friction = comparison.friction[index]
-            largest = max(largest, draw_residuals(axes, comparison, loads, friction))
-        share_limits(panels[1], largest)
+        largest = []
+        for axes, friction in zip(panels[1], comparison.friction[[0, -1]], strict=True):
+            largest.append(draw_residuals(axes, comparison, loads, friction))
+        share_limits(panels[1], max(largest))
     return figure
 
 

@@ -35,8 +35,9 @@ def holds_figure(holds: Holds) -> Figure:
             axes.hlines(holds.mean[name] / scale, first, last, color=GAUSSIAN, lw=2.5, zorder=3)
             axes.set_ylabel(label)
             axes.sharex(panels[0])
-        title = f"{first.size} holds (thick) in {holds.line.size} rows of the log"
-        panels[0].set_title(title, loc="left")
+        panels[0].set_title(
+            f"{first.size} holds (thick) in {holds.line.size} rows of the log", loc="left"
+        )
         panels[-2].set_xlabel("line of the file")
         axes = panels[-1]
         along = "y" if np.ptp(holds.mean.get("y", 0.0)) > np.ptp(holds.mean["x"]) else "x"

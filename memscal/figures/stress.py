@@ -125,8 +125,7 @@ def _draw_stress(axes: Axes, restored: Restoration) -> None:
     draw_band(axes, r, stress - band, stress + band)
     axes.plot(r, stress, color=DECONVOLVED, label=rf"restored $\sigma_{{zz}}$, ±{coverage():g}u")
     blurred = restored.blurred_stress(restored.r) / KPA
-    label = r"blurred again, $S_{zz} = G*\sigma_{zz}$"
-    axes.plot(r, blurred, color=GAUSSIAN, ls="-.", label=label)
+    axes.plot(r, blurred, color=GAUSSIAN, ls="-.", label=r"blurred again, $S_{zz} = G*\sigma_{zz}$")
     compared = restored.comparison
     if compared:
         label = "expected"

@@ -78,9 +78,8 @@ def require_contacts(scans: Sequence[Scan | MeasuredScan]) -> None:
         if isinstance(scan, Scan) and scan.y is not None:
             require_line(place, scan.x, scan.y)
         if (scan.film, scan.indenter) != (scans[0].film, scans[0].indenter):
-            problem = f"{place} states another film or sphere than the first scan."
             raise InputError(
-                problem,
+                f"{place} states another film or sphere than the first scan.",
                 why="Scans that are compared together share the calculated contacts.",
                 cure="Compare them one by one, or correct /entry/sample/film and /entry/indenter.",
             )
@@ -235,8 +234,10 @@ def compare(
     tangential = None if shear is None else opened_apparatus(shear, accept_altered=accept_altered)
     _require_macroscopic(macroscopic, macroscopic_uncertainty, interface=interface)
     if lubricated not in (None, FRICTIONLESS, APART):
-        problem = f"Lubricated loads cannot be fitted {lubricated!r}."
-        raise InputError(problem, cure=f"Give {FRICTIONLESS!r} or {APART!r}, or leave it out.")
+        raise InputError(
+            f"Lubricated loads cannot be fitted {lubricated!r}.",
+            cure=f"Give {FRICTIONLESS!r} or {APART!r}, or leave it out.",
+        )
     if lubricated and lubricated_friction not in (0.0, LUBRICATED_FRICTION):
         raise InputError(
             f"Lubricated loads are to be fitted {lubricated!r}, and with a friction of their own.",
@@ -250,17 +251,17 @@ def compare(
     measured = _measured(opened, sensor, override)
     setting = _setting(measured, cache, workers)
     if sensor.order:
-        others = (references, lubricated, shear, macroscopic)
-        if any(option is not None for option in others):
-            problem = "The artifact is of a tangential channel, with options of the normal one."
+        if any(option is not None for option in (references, lubricated, shear, macroscopic)):
             raise InputError(
-                problem,
+                "The artifact is of a tangential channel, with options of the normal one.",
                 cure="Leave out references, lubricated, shear and macroscopic, or give that of zz.",
             )
         return _compared_by_shear(measured, sensor, setting, friction, loading, override)
     if tangential and references is not None:
-        problem = "Profiles of another program and the shear are asked for."
-        raise InputError(problem, cure="Leave one of them out: those profiles have no shear.")
+        raise InputError(
+            "Profiles of another program and the shear are asked for.",
+            cure="Leave one of them out: those profiles have no shear.",
+        )
     notes = _accept_tangential(measured, tangential, override) if tangential else []
 
     # Calculate the contacts, by the definition of their loading.
@@ -330,15 +331,23 @@ def _require_few(contacts: Sequence[Scan | MeasuredStress], channels: Sequence[s
         for name, size, shared in _readings(item, channels):
             total += size
             if shared and size > MOST_COMPARED_TOGETHER:
-                what = "readings that share noise (a correlation, or two channels)"
-                why = "A matrix over them is held in memory for each friction coefficient."
-                cure = "Average neighbouring readings, or compare without correlation and shear."
-                raise too_large(name, size, MOST_COMPARED_TOGETHER, what, why=why, cure=cure)
+                raise too_large(
+                    name,
+                    size,
+                    MOST_COMPARED_TOGETHER,
+                    "readings that share noise (a correlation, or two channels)",
+                    why="A matrix over them is held in memory for each friction coefficient.",
+                    cure="Average neighbouring readings, or compare without correlation and shear.",
+                )
     if total > MOST_COMPARED:
-        what = "What is compared"
-        why = "Columns over them are held for each friction coefficient."
-        cure = "Average neighbouring readings, or leave out repeats."
-        raise too_large(what, total, MOST_COMPARED, "readings", why=why, cure=cure)
+        raise too_large(
+            "What is compared",
+            total,
+            MOST_COMPARED,
+            "readings",
+            why="Columns over them are held for each friction coefficient.",
+            cure="Average neighbouring readings, or leave out repeats.",
+        )
 
 
 def _readings(
@@ -495,8 +504,9 @@ def _loads(
         profiles = {loading: load.by_profile for loading, load in by_loading.items()}
         profiles = with_loading(profiles, tested=tested)
         for loading, load in by_loading.items():
-            by_maximum = maxima[loading]
-            by_loading[loading] = replace(load, by_maximum=by_maximum, by_profile=profiles[loading])
+            by_loading[loading] = replace(
+                load, by_maximum=maxima[loading], by_profile=profiles[loading]
+            )
         loads.append(by_loading)
     return {loading: tuple(load[loading] for load in loads) for loading in fits}
 

@@ -179,8 +179,7 @@ def half_normal_weights(values: FloatArray, width: float) -> FloatArray:
 
 def random_uncertainty(budget: Mapping[str, float]) -> float:
     """Return what noise, centre and baseline add to a measured maximum."""
-    parts = [u for source, u in budget.items() if source not in _SYSTEMATIC]
-    return math.hypot(*parts)
+    return math.hypot(*(u for source, u in budget.items() if source not in _SYSTEMATIC))
 
 
 def with_loading(by_loading: ByLoading, *, tested: bool) -> dict[str, BoundedEstimate]:
@@ -242,8 +241,9 @@ def fit_together(
     if held and lubricated_friction is not None and first == 0:
         for lubrication, chosen in indices.items():
             for loading, fit in fits.items():
-                estimate = fit.coefficient_beside(chosen, held, lubricated_friction)
-                joint[lubrication][loading] = estimate
+                joint[lubrication][loading] = fit.coefficient_beside(
+                    chosen, held, lubricated_friction
+                )
     tested = measured.noise_stated
     return {kind: with_loading(held, tested=tested) for kind, held in joint.items()}
 

@@ -117,9 +117,8 @@ class ProfileFamily(FrozenArrays):
         changes = {source: arrays[:, 2 + i] for i, source in enumerate(self.changes)}
         numbers: Values = {}
         for name in _NUMBERS:
-            columns = getattr(self, name).T
-            interpolated = [np.interp(t, nodes, column) for column in columns]
-            numbers[name] = np.stack(interpolated, axis=1)
+            columns = [np.interp(t, nodes, column) for column in getattr(self, name).T]
+            numbers[name] = np.stack(columns, axis=1)
         return replace(
             self,
             values=chosen,
@@ -132,7 +131,7 @@ class ProfileFamily(FrozenArrays):
 
     def only(self, loads_index: int | Sequence[int]) -> ProfileFamily:
         """Return the family at one or several of its loads, by index, in the order given."""
-        chosen = np.atleast_1d(np.asarray(loads_index, np.intp))
+        chosen = np.atleast_1d(loads_index)
         names = ["spectra", "by_load", *_NUMBERS]
         if self.slopes is not None:
             names.append("slopes")

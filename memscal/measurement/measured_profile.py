@@ -141,8 +141,7 @@ def require_points(scan: Scan, signal: ContactSignal) -> None:
         return
     order = np.argsort(scan.x)
     x = scan.x[order]
-    measured = complete.reshape(-1, scan.x.size)[:, order].any(axis=0)
-    places = np.flatnonzero(measured)
+    places = np.flatnonzero(complete.reshape(-1, scan.x.size)[:, order].any(axis=0))
     missing = np.diff(places) - 1
     gaps = np.where(missing > 0, np.diff(x[places]), 0.0)
     if gaps.size and gaps.max() > signal.contact_radius:
@@ -351,9 +350,8 @@ def measured_profile(
     r = np.hypot(x - restored.centre[0], y - restored.centre[1])
     order = np.argsort(r, kind="stable")
     background = posterior.estimate.model.drift_columns @ posterior.drift
-    averaged = average @ (restored.points.u - background)
-    s_zz = averaged[order] / a
     average = average[order]
+    s_zz = average @ (restored.points.u - background) / a
     decorrelation = restored.points.decorrelation
     if decorrelation:
         # Of repeats there are more columns than positions.
@@ -402,8 +400,9 @@ def _points(scan: Scan, noise: FloatArray, restored: Restoration) -> Mapping[str
             # The normal stress does not need it; a comparison of the shear states what is missing.
             with suppress(InputError, FitError):
                 shear = measured_points(scan, channel)
-                ones = np.ones_like(shear.u)
-                points[channel] = _channel_points(scan, shear, shear.u_errors, ones)
+                points[channel] = _channel_points(
+                    scan, shear, shear.u_errors, np.ones_like(shear.u)
+                )
     return points
 
 
@@ -437,7 +436,7 @@ def _place_roots(restored: Restoration, average: Any) -> Arrays:
     film = film_transfer(restored.scan.set_up.expected, model.reference.wavenumbers)
     pressure = posterior.stress / restored.scan.stated_load / film
     a = restored.apparatus.conversion_constant
-    geometry = model.geometry(np.atleast_2d(restored.centre))
+    geometry = model.geometry(restored.centre)
     by_centre = average @ model.centre_derivative(geometry, pressure) / a
     by_drift = average @ model.drift_columns / a
     covariance = posterior.covariance[posterior.nodes :, posterior.nodes :]

@@ -346,7 +346,7 @@ def _direct(restored: Restoration, spectrum: FloatArray) -> tuple[float, int]:
     points = estimate.points
     model = estimate.model
     # Repeats share the centre, which is zero across a line.
-    geometry = model.geometry(np.atleast_2d(restored.centre))
+    geometry = model.geometry(restored.centre)
     pressure = spectrum / film_transfer(scan.set_up.expected, model.reference.wavenumbers)
     signal = model.signal(geometry, pressure)
     # One load cell errs alike under the rod, which changes A, and under the contact.

@@ -337,8 +337,10 @@ def _messages(restored: Restoration, checks: Sequence[QualityCheck]) -> Iterator
 def failed_calibration_messages(apparatus: ApparatusFunction) -> Iterator[Message]:
     """Say that a check of the calibration had failed, if one had."""
     if not apparatus.passed:
-        text = f"Quality checks of the calibration itself {state_of_checks(apparatus.checks)}."
-        yield Message(FAILED_CALIBRATION, text)
+        yield Message(
+            FAILED_CALIBRATION,
+            f"Quality checks of the calibration itself {state_of_checks(apparatus.checks)}.",
+        )
 
 
 def noise_unstated_message(noise: str) -> Message:

@@ -162,8 +162,10 @@ def indent(
                 cure='Use backend="fem" for a film with a free edge.',
             )
     if (load is None) == (depth is None):
-        problem = "Give either a load or a depth" + (", not both." if load is not None else ".")
-        raise InputError(problem, why="One follows from the other.")
+        raise InputError(
+            "Give either a load or a depth" + (", not both." if load is not None else "."),
+            why="One follows from the other.",
+        )
     values = np.asarray(load if depth is None else depth, np.float64)
     if values.ndim > 1 or values.size == 0:
         raise InputError(f"The loads or depths have shape {values.shape}; give a flat list.")
