@@ -301,7 +301,7 @@ def _propagated(
     if isinstance(solution.fields, RasterFields):
         from memscal.calibration.field_uncertainty import field_errors
 
-        plane = field_errors(solution, solution.deconvolution, *inputs[:2])
+        plane = field_errors(solution, *inputs[:2])
         results = replace(results, field_errors=plane)
     # Some checks are of the division, whichever the method.
     if (other or not results.division) and solution.other:

@@ -146,10 +146,11 @@ def _input_columns(solution: Solution, without: str = "") -> FloatArray:
     """Voltages by one standard uncertainty of each stated input, (n, q), in V."""
     estimate = solution.estimate
     effects = input_effects(solution.scans, solution.stresses, estimate)
-    columns = []
-    for name, effect in effects.items():
-        if name != "load" and name.rstrip("0123456789") != without:
-            columns.append(effect.voltage)
+    columns = [
+        effect.voltage
+        for name, effect in effects.items()
+        if name != "load" and name.rstrip("0123456789") != without
+    ]
     # A balance's error may differ from load to load; repeats at one load share it.
     pairs = zip(solution.owners, solution.scans, strict=True)
     balances = [(owner, scan.stated_load, scan.load_uncertainty) for owner, scan in pairs]
@@ -270,9 +271,10 @@ def free_thickness(solution: Solution) -> FreeThickness:
     nodes = estimate.model.reference.wavenumbers
 
     def log_posterior(z: FloatArray) -> FloatArray:
-        varied = {}
-        for film, thickness in zip(films, stated + z * u, strict=True):
-            varied[film] = replace(film, thickness=float(thickness))
+        varied = {
+            film: replace(film, thickness=float(thickness))
+            for film, thickness in zip(films, stated + z * u, strict=True)
+        }
         rods = [press_rod(*s.set_up._replace(film=varied[s.set_up.film])) for s in scans]
         model = ForwardModel(estimate.points, reference_spectra(rods, points, nodes))
         varied_estimate = replace(estimate, model=model)

@@ -241,10 +241,11 @@ class ScanPoints:
 
     def selected(self, chosen: IndexArray) -> ScanPoints:
         """Return some of the points, without their correlations."""
-        columns: dict[str, Any] = {}
-        for name, value in vars(self).items():
-            if isinstance(value, np.ndarray) and name not in ("free", "curvature"):
-                columns[name] = value[chosen]
+        columns: dict[str, Any] = {
+            name: value[chosen]
+            for name, value in vars(self).items()
+            if isinstance(value, np.ndarray) and name not in ("free", "curvature")
+        }
         return replace(self, **columns, decorrelation=None)
 
     def standardised(

@@ -160,10 +160,11 @@ def profile_figure(comparison: FrictionComparison, lubrication: str) -> Figure:
     with panels_of(4.6, 2, 2, height_ratios=(2.2, 1), sharex=True) as (figure, panels):
         draw_profiles(panels[0, 0], comparison, loads)
         draw_profiles(panels[0, 1], comparison, loads, logarithmic=True)
-        largest = []
-        for axes, friction in zip(panels[1], comparison.friction[[0, -1]], strict=True):
-            largest.append(draw_residuals(axes, comparison, loads, friction))
-        share_limits(panels[1], max(largest))
+        largest = max(
+            draw_residuals(axes, comparison, loads, friction)
+            for axes, friction in zip(panels[1], comparison.friction[[0, -1]], strict=True)
+        )
+        share_limits(panels[1], largest)
     return figure
 
 

@@ -66,9 +66,10 @@ def measured_stress_figure(measured: MeasuredStress) -> Figure:
         logarithmic.set_ylim(_DECADES * top, 1.6 * top)
         logarithmic.yaxis.set_major_formatter("{x:g}")
         # Loads by colour and states by mark, once for both panels.
-        handles = []
-        for colour, name in dict.fromkeys(looks.values()):
-            handles.append(Line2D([], [], color=colour, lw=2.0, label=name))
+        handles = [
+            Line2D([], [], color=colour, lw=2.0, label=name)
+            for colour, name in dict.fromkeys(looks.values())
+        ]
         for state in dict.fromkeys(profile.lubrication for profile in measured.profiles):
             look = mark(state, "0.2")
             words = state or "measured"

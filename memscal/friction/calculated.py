@@ -135,10 +135,11 @@ def _grid(
 
 def _nearest(tables: Sequence[_Table], mu: float, load: float) -> StressProfile | None:
     """Return the table of a friction coefficient whose load is nearest, and near enough."""
-    near = []
-    for friction, profile in tables:
-        if friction == mu and abs(profile.load / load - 1) <= _SAME_LOAD:
-            near.append(profile)
+    near = [
+        profile
+        for friction, profile in tables
+        if friction == mu and abs(profile.load / load - 1) <= _SAME_LOAD
+    ]
     near.sort(key=lambda profile: abs(profile.load - load))
     if len(near) > 1 and near[0].load == near[1].load:
         raise InputError(

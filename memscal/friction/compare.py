@@ -452,11 +452,8 @@ def compare_measured(
 
     first = next(iter(channels.values()))
     frictionless = first.at(first.family.values[0])
-    differences = []
-    for pair in lubricated_pairs(measured.profiles):
-        difference = dry_against_lubricated(measured, frictionless, pair)
-        if difference:
-            differences.append(difference)
+    pairs = lubricated_pairs(measured.profiles)
+    differences = (dry_against_lubricated(measured, frictionless, pair) for pair in pairs)
 
     stated = measured.noise_stated
     checks = (*measured.checks, *comparison_checks(loads, joint, noise_stated=stated))
@@ -465,7 +462,7 @@ def compare_measured(
         friction=first.family.values,
         loads=loads,
         joint=joint,
-        dry_against_lubricated=tuple(differences),
+        dry_against_lubricated=tuple(filter(None, differences)),
         macroscopic=macroscopic,
         checks=checks,
         messages=comparison_messages(measured, families, joint, checks),

@@ -74,9 +74,10 @@ def dry_against_lubricated(
     apart = replace(apart, flat=flat, correlation=correlation)
     nothing = np.zeros((1, noise.size))
     # Of what all scans share only the difference is left; the rest is each scan's own.
-    columns = {}
-    for source, column in dry_contact.columns.items():
-        columns[source] = column - lubricated_contact.columns[source]
+    columns = {
+        source: column - lubricated_contact.columns[source]
+        for source, column in dry_contact.columns.items()
+    }
     standardised = standardise(apart, Predicted(nothing, nothing, nothing, nothing, columns))
     _, (chi_square,) = log_likelihood(standardised.statistics)
 

@@ -371,10 +371,11 @@ class FamilySetup:
             "thickness": (thicker, film.thickness, film.thickness_uncertainty),
             "indenter_radius": (larger, indenter.radius, indenter.radius_uncertainty),
         }
-        changes = {}
-        for source, (derivative, value, uncertainty) in stated.items():
-            if uncertainty is not None:
-                changes[source] = derivative * (uncertainty / value)
+        changes = {
+            source: derivative * (uncertainty / value)
+            for source, (derivative, value, uncertainty) in stated.items()
+            if uncertainty is not None
+        }
         if sides:
             upper, lower = (side["spectra"] for side in sides)
             slope = (upper - lower) / (ratios[0] - ratios[1])

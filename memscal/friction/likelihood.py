@@ -350,11 +350,10 @@ def stacked(normal: Readings, shear: Readings) -> Readings:
 
     def joined(pair: Sequence[Any], names: Sequence[str], axis: int) -> Values:
         """Arrays of both channels, one after the other."""
-        arrays = {}
-        for name in names:
-            both = [getattr(channel, name) for channel in pair]
-            arrays[name] = np.concatenate(both, axis=axis)
-        return arrays
+        return {
+            name: np.concatenate([getattr(channel, name) for channel in pair], axis=axis)
+            for name in names
+        }
 
     correlations = []
     contacts = []
@@ -382,10 +381,10 @@ def stacked(normal: Readings, shear: Readings) -> Readings:
     padded = {}
     for source in dict.fromkeys([*columns[0], *columns[1]]):
         width = next(changes[source].shape[-1] for changes in columns if source in changes)
-        both = []
-        for reading, changes in zip(predicted, columns, strict=True):
-            absent = np.zeros((*reading.signal.shape, width))
-            both.append(changes.get(source, absent))
+        both = [
+            changes.get(source, np.zeros((*reading.signal.shape, width)))
+            for reading, changes in zip(predicted, columns, strict=True)
+        ]
         padded[source] = np.concatenate(both, axis=1)
     arrays = joined(predicted, ("signal", "by_load", "by_coordinate", "slope"), axis=1)
     return together, Predicted(**arrays, columns=padded)

@@ -472,9 +472,10 @@ def _kernel_changes(
 
 def common_inputs(apparatus: ApparatusFunction, other: ApparatusFunction) -> list[str]:
     """Return the inputs that the calibrations of two channels by one rod scan have in common."""
-    scans = set()
-    for one in (apparatus, other):
-        scans.add((one.film, one.indenter, one.load, one.load_cell, one.process.input_scan))
+    scans = {
+        (one.film, one.indenter, one.load, one.load_cell, one.process.input_scan)
+        for one in (apparatus, other)
+    }
     if len(scans) > 1:
         return []
     return [name for name in apparatus.kernel_changes if name in other.kernel_changes]
