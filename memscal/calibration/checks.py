@@ -205,9 +205,9 @@ def _shape(solution: Solution, parameters: ParameterSet) -> _Checks:
     ratios = [parameters["fwhm"] / (_HALF_WIDTH * parameters[name]) for name in _WIDTHS]
     widest = max(max(ratio, 1 / ratio) for ratio in ratios)
     share = ring_areas(g.r) * g.radial
-    negative = np.maximum(-share, 0.0).sum() / np.abs(share).sum()
+    negative = np.maximum(-share, 0.0).sum() / abs(share).sum()
     k, transfer = solution.fields.grid.axis_transfer(deconvolution.quotient.values)
-    power = k * np.abs(transfer / deconvolution.conversion_constant) ** 2
+    power = k * abs(transfer / deconvolution.conversion_constant) ** 2
     end = max(solution.band.resolved, solution.band.relevant, 2 / solution.estimate.gaussian.sigma)
     rough = power[k > _BEYOND * end].sum() / power.sum()
     cure = "take method white-noise or bayesian, or more regularisation"
@@ -321,7 +321,7 @@ def _baseline(estimate: ProfileEstimate) -> _Checks:
     last = 1 + points.free[0].sum()
     yield check(
         "baseline_drift",
-        2 * np.abs(estimate.drifts[1:last]).max() / estimate.largest_signal,
+        2 * abs(estimate.drifts[1:last]).max() / estimate.largest_signal,
         0.05,
         "Change of the baseline across the scan over the largest signal. It is fitted and removed "
         "as a line that is straight or a little curved; a failure means that what is left of it "
@@ -332,7 +332,7 @@ def _baseline(estimate: ProfileEstimate) -> _Checks:
         prior = points.curvature[points.curved] ** 2
         # What a mean has of the prior's variance the posterior has not.
         found = prior - np.diag(estimate.weighed.covariance)[points.curvatures]
-        share = np.abs(estimate.drifts[-count:]) / np.sqrt(np.maximum(found, _LEAST_FOUND * prior))
+        share = abs(estimate.drifts[-count:]) / np.sqrt(np.maximum(found, _LEAST_FOUND * prior))
         yield check(
             "baseline_curvature",
             share.max(),

@@ -106,5 +106,5 @@ def _divided(
     drawn = deconvolve(estimate, band, fields, method)
     k, spectrum = fields.grid.axis_transfer(drawn.quotient.values)
     wavenumbers = solution.fields.grid.wavenumber_axis
-    transfer = np.interp(wavenumbers, k, np.abs(spectrum) / drawn.conversion_constant, right=0.0)
+    transfer = np.interp(wavenumbers, k, abs(spectrum) / drawn.conversion_constant, right=0.0)
     return *read_off(drawn, solution.deconvolution.g.r), transfer

@@ -208,7 +208,7 @@ def _changed(solution: Solution, name: str, size: float, fit: GaussianFit) -> Fo
     elif name == "baseline_curvature":
         added = size * solution.estimate.largest_signal * model.parabola
     elif name == "gain_curvature":
-        added = -size * signal * np.abs(signal) / np.abs(signal).max()
+        added = -size * signal * abs(signal) / abs(signal).max()
     else:
         # The reading is a mean over where the indenter was; what it lags on average is no error.
         kernel = fit.conversion_constant * gaussian_transfer(model.k, fit.sigma)

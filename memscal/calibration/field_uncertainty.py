@@ -88,7 +88,7 @@ def _nodes(axis: FloatArray, width: float, reach: float) -> FloatArray:
     middle = axis.size // 2
     every = max(int(width / _PER_WIDTH / (axis[1] - axis[0])), 1)
     nodes: FloatArray = axis[middle % every :: every]
-    near: BoolArray = np.abs(nodes) <= max(reach, 4 * nodes[nodes.size // 2 + 1])
+    near: BoolArray = abs(nodes) <= max(reach, 4 * nodes[nodes.size // 2 + 1])
     return nodes[near]
 
 
@@ -252,7 +252,7 @@ def _division_variances(
     x, y = axes
     # Nodes where G is stated.
     most = fields.support + 3 * fields.step
-    stated = (np.abs(y) <= most, np.abs(x) <= most)
+    stated = (abs(y) <= most, abs(x) <= most)
     inside = np.flatnonzero(np.logical_and.outer(*stated))
     window = deconvolution.quotient.window
     stress = grid.forward(fields.stress.values)

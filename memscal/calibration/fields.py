@@ -45,8 +45,8 @@ def choose_grid(estimate: ProfileEstimate, band: Band) -> GridChoice:
     support = rounded_reach(estimate.distance.max(), points.step)
     if points.as_raster:
         # A square of this half width lies within the raster's longer side.
-        support = float(np.abs(points.x - estimate.centre[0]).max())
-    reference = np.abs(estimate.model.reference.values)
+        support = float(abs(points.x - estimate.centre[0]).max())
+    reference = abs(estimate.model.reference.values)
     # A shear's transform vanishes at k = 0, too: only what lies beyond its largest counts.
     beyond = np.arange(reference.size) > np.argmax(reference)
     closed = np.flatnonzero(beyond & (reference < 0.1 * NOISE_RATIO * band.weakest_reference))
@@ -247,8 +247,8 @@ class RasterFields:
         fine, values = self.grid.refined(kernel, refinement)
         if profile:
             values = self._lifted(profile.radial, fine)
-        inside_x = np.abs(fine.x) <= self.support
-        inside_y = np.abs(fine.y) <= self.support
+        inside_x = abs(fine.x) <= self.support
+        inside_y = abs(fine.y) <= self.support
         inside = np.ix_(inside_y, inside_x)
         return Field(Lattice(fine.x[inside_x], fine.y[inside_y]), values[inside])
 

@@ -130,7 +130,7 @@ def prepare(as_stated: Sequence[Scan], request: Request) -> Prepared:
     peak = None
     per = stresses[0].unit
     if request.relative:
-        peak = float(np.abs(stress_table(stresses[0]).sigma_zz).max())
+        peak = float(abs(stress_table(stresses[0]).sigma_zz).max())
         # A point has no largest value, but a unit integral.
         per = RELATIVE if peak else f"{RELATIVE} {per}"
         peak = peak or 1.0

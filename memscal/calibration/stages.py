@@ -284,7 +284,7 @@ class Solution:
         reach = self.choice.support
         if spectrum.order:
             r = np.linspace(0.0, _FAR * reach, _RADII)
-            flux = np.abs(spectrum.at(r)) * (r if spectrum.order > 0 else 1.0)
+            flux = abs(spectrum.at(r)) * (r if spectrum.order > 0 else 1.0)
             return float(flux[r > reach].sum() / flux.sum())
         # Within R the integral is that of R U(k) J_1(kR) dk over all k.
         k = spectrum.wavenumbers.k

@@ -13,6 +13,7 @@ load scales A; on a film at finite strain it changes the base stress per newton 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
@@ -180,7 +181,7 @@ def _varying_gain(estimate: ProfileEstimate) -> float:
     # A repeat that tells nothing of its gain lets no variation be found.
     weight = np.maximum(weight, 1.0)
     variance = np.var(product / weight, ddof=1) - np.mean(1 / weight)
-    return float(np.sqrt(max(variance, 0.0) / repeats.size))
+    return math.sqrt(max(variance, 0.0) / repeats.size)
 
 
 def correlation_matrix(sources: Sequence[str], correlations: Correlations) -> FloatArray:
@@ -420,7 +421,7 @@ def _budget(row: int, columns: Arrays, covariance: FloatArray) -> dict[str, floa
     variance = covariance[row, row]
     excess = variance - sum(u**2 for u in budget.values())
     if abs(excess) > _ROUNDING * variance:
-        budget["correlations"] = float(np.copysign(np.sqrt(abs(excess)), excess))
+        budget["correlations"] = math.copysign(math.sqrt(abs(excess)), excess)
     return budget
 
 

@@ -52,7 +52,7 @@ def find_band(estimate: ProfileEstimate, smoothed: SmoothedProfile | None) -> Ba
     reference = envelope(estimate.model.reference.values)
     error = np.maximum(transfer_uncertainty(estimate), TINY)
     clear = RELEVANT
-    signal = np.abs((smoothed or estimate).spectrum.values)
+    signal = abs((smoothed or estimate).spectrum.values)
     if not smoothed:
         noise = error * estimate.conversion_constant * reference
     elif estimate.points.as_raster:
@@ -96,7 +96,7 @@ def beyond_zeros(
     # The mean of two lobes over all directions is smaller than either: their power is not.
     width = wavenumber[0, 1]
     ring = np.rint(wavenumber / width).astype(np.intp).ravel()
-    power = np.bincount(ring, np.abs(voltage.ravel()) ** 2) / np.bincount(ring)
+    power = np.bincount(ring, abs(voltage.ravel()) ** 2) / np.bincount(ring)
     # Rings beyond, in the corners, have few components, any of which may be large by chance.
     rings = np.arange(0.0, np.pi / points.step, width)
     relevant = _falls_below(rings, np.sqrt(power[: rings.size]) / noise, _SEEN)
@@ -109,7 +109,7 @@ def beyond_zeros(
 
 def envelope(reference: FloatArray) -> FloatArray:
     """Largest modulus of a transform from each wavenumber on: it falls, and has no zeros."""
-    return np.maximum.accumulate(np.abs(reference)[::-1])[::-1]
+    return np.maximum.accumulate(abs(reference)[::-1])[::-1]
 
 
 def _shares(estimate: ProfileEstimate) -> FloatArray:

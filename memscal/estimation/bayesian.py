@@ -101,7 +101,7 @@ class _Sensors:
         data = data - start @ columns.T
         scale = np.linalg.norm(values, axis=1, keepdims=True)
         q, r = np.linalg.qr(values / scale)
-        diagonal = np.abs(np.diagonal(r, axis1=1, axis2=2))
+        diagonal = abs(np.diagonal(r, axis1=1, axis2=2))
         log_determinant = np.log(diagonal * scale[:, 0]).sum(axis=1)
         rest = data - _times(q, _times(q.mT, data))
         return cls(start, (choice / scale) @ np.linalg.inv(r), q, log_determinant, data, rest)
@@ -227,7 +227,7 @@ def _likelihoods(
 ) -> ArrayTriple:
     """Log marginal likelihoods, variances of the residuals, and of the noise, (h,) each."""
     total = np.sum(sensors.rest**2, axis=1) + noise.added * noise.freedom
-    least = (_ROUNDING * np.abs(sensors.data).max(axis=1)) ** 2
+    least = (_ROUNDING * abs(sensors.data).max(axis=1)) ** 2
     total = total[family]
     least = np.maximum(least, 1e-300)[family]
     beyond = np.maximum(total - power.sum(axis=1), 0.0)

@@ -361,7 +361,7 @@ def _fitted_families(reduced: ReducedScan) -> Iterator[FamilyFit]:
         growth = (a * (data @ slope) - b * (data @ signal)) / determinant / amplitudes
         growth = np.clip(growth, -_LONGEST, _LONGEST)
         widths = widths * np.exp(growth)
-        if np.abs(growth).max() < _SETTLED:
+        if abs(growth).max() < _SETTLED:
             break
     for family, width, amplitude in zip(FAMILIES, widths, amplitudes, strict=True):
         if amplitude > 0 and start / _FARTHEST < width < start * _FARTHEST:

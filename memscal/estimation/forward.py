@@ -156,7 +156,7 @@ class Geometry:
     def _nodes_of(self, spread: FloatArray) -> int:
         """How many first nodes factors need: all, a half, a quarter and so on."""
         # A source with an edge has many waves, of which a wide kernel passes few.
-        size = np.abs(spread)
+        size = abs(spread)
         used = np.flatnonzero(size > _NO_SHARE * size.max())
         needed = 1 + (used[-1] // (spread.size // len(spread)) if used.size else 0)
         halvings = int(np.log2(self.k.size / needed))

@@ -55,7 +55,7 @@ def gauss_newton(
         # The triangular factor of both stands for them.
         both = triangular(np.column_stack([slope * root[:, None], -residual * root]))
         whole = np.linalg.lstsq(both[:, :-1], both[:, -1])[0]
-        longest = np.abs(whole).max()
+        longest = abs(whole).max()
         step = np.asarray(whole * (_LONGEST_STEP / max(longest, _LONGEST_STEP)))
         place = place + step
         cost = loss
@@ -164,7 +164,7 @@ def _amplitudes(shapes: FloatArray, data: FloatArray, drift: FloatArray) -> Arra
     rest = data - base @ (base.T @ data)
     square = np.sum(free**2, axis=1)
     amplitudes = np.divide(free @ rest, square, out=np.zeros_like(square), where=square > 0)
-    return amplitudes, np.abs(rest - amplitudes[:, None] * free).sum(axis=1)
+    return amplitudes, abs(rest - amplitudes[:, None] * free).sum(axis=1)
 
 
 def _trial_centres(model: ForwardModel) -> FloatArray:
@@ -300,7 +300,7 @@ def _solve(
     begin = start / scale
     fit = linearise(model, begin * scale)
     left = points.standardised(points.u - fit.predicted, weights)
-    noise = robust_scale(left, 1e-12 * np.abs(left).max() + TINY)
+    noise = robust_scale(left, 1e-12 * abs(left).max() + TINY)
     # The solvers ask for residuals and slopes one after the other, at the same place.
     last = {begin.tobytes(): fit}
     prior = points.prior_rows

@@ -54,7 +54,7 @@ def influences(scans: Sequence[Scan], estimate: ProfileEstimate) -> dict[str, In
     found = {
         "stage_scale": Influence(slope * estimate.distance),
         "baseline_curvature": Influence(largest * model.parabola),
-        "gain_curvature": Influence(-signal * np.abs(signal) / largest),
+        "gain_curvature": Influence(-signal * abs(signal) / largest),
         "load_scale": Influence(np.zeros_like(signal), scaling=1.0),
     }
     if estimate.points.order:

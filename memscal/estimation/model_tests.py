@@ -146,7 +146,7 @@ def _widened(estimate: ProfileEstimate, factors: tuple[float, ...]) -> FloatArra
 def _add(estimate: ProfileEstimate, columns: FloatArray) -> ExtraColumns:
     """Fit the columns together with a round Gaussian, the departures subtracted as estimated."""
     weights = estimate.weights / estimate.noise_scale**2
-    scale = np.abs(columns).max(axis=0)
+    scale = abs(columns).max(axis=0)
     columns = columns / scale
     jacobian = estimate.gaussian.jacobian
     count = jacobian.shape[1] - estimate.points.ellipse
@@ -158,7 +158,7 @@ def _add(estimate: ProfileEstimate, columns: FloatArray) -> ExtraColumns:
     residual = root[count:, -1]
     coefficients = np.linalg.lstsq(free, residual)[0]
     fall = float(residual @ free @ coefficients)
-    size = np.abs(columns @ coefficients).max() / estimate.largest_signal
+    size = abs(columns @ coefficients).max() / estimate.largest_signal
     return ExtraColumns(fall, columns.shape[1], coefficients / scale, size)
 
 

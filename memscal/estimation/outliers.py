@@ -24,7 +24,7 @@ _NORMAL = 1.4826
 
 def robust_scale(values: FloatArray, least: float) -> float:
     """Standard deviation of a normal distribution by the median absolute value, no less."""
-    return max(_NORMAL * float(np.median(np.abs(values))), least)
+    return max(_NORMAL * float(np.median(abs(values))), least)
 
 
 def point_weights(
@@ -35,14 +35,14 @@ def point_weights(
     # in robust standard deviations of their own, of ``least`` or more; on a raster in those of
     # their neighbours where these are larger.
     root = np.sqrt(stated)
-    least = _MODEL * (np.abs(points.u).max() * np.sqrt(np.median(stated)))
+    least = _MODEL * (abs(points.u).max() * np.sqrt(np.median(stated)))
     standardised = residual * root
     scale: FloatArray | float = robust_scale(standardised, least)
     if points.planar:
         standardised = isolated(points, residual) * root
         # Errors of the stage make more noise where the voltage is steep.
-        scale = np.maximum(scale, _NORMAL * median_nearby(points, np.abs(standardised)))
-    z = np.abs(standardised) / scale
+        scale = np.maximum(scale, _NORMAL * median_nearby(points, abs(standardised)))
+    z = abs(standardised) / scale
     return np.minimum(1.0, (threshold / np.maximum(z, threshold)) ** 4)
 
 

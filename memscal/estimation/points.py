@@ -359,7 +359,7 @@ def calibration_points(scan: Scan, channel: str = "zz") -> ScanPoints:
     points = measured_points(scan, channel)
     relative = scan.baseline_curvature_uncertainty
     # The median of three points does not follow a single outlier.
-    rise = np.sort(np.abs(rise_of(points.x, points.y, points.u)))
+    rise = np.sort(abs(rise_of(points.x, points.y, points.u)))
     deviation = np.median(rise[-3:]) * (CURVATURE if relative is None else relative)
     return replace(points, curvature=np.array([deviation]))
 
@@ -511,7 +511,7 @@ def ordinary_readings(points: ScanPoints) -> BoolArray:
     share = _FEW_OF_RASTER if points.planar else _FEW_OF_LINE
     for inside in points.inside:
         rows = np.flatnonzero(inside)
-        distance = np.abs(points.u[rows] - np.median(points.u[rows]))
+        distance = abs(points.u[rows] - np.median(points.u[rows]))
         order = np.argsort(distance)
         few = max(int(share * rows.size), 1)
         farthest = distance[order[-few - 1 :]]
@@ -552,7 +552,7 @@ def _last_digit(u: FloatArray) -> float:
     least = steps.min(initial=np.inf)
     for digits in range(1, _MOST_DIGITS + 1):
         number = digits * steps / least
-        if np.abs(number - np.rint(number)).max(initial=0.0) < _WHOLE:
+        if abs(number - np.rint(number)).max(initial=0.0) < _WHOLE:
             return float(least) / digits
     return 0.0
 

@@ -254,7 +254,7 @@ class ProfileEstimate:
     @property
     def largest_signal(self) -> float:
         """Largest voltage above the background, in V."""
-        return float(np.abs(self.signal).max())
+        return float(abs(self.signal).max())
 
 
 def _root(numbers: VoltageMap, noise: FloatArray, factor: Decorrelation | None) -> FloatArray:
@@ -417,7 +417,7 @@ def _least_noise(fit: GaussianFit) -> float:
     """Least noise of a point of weight one: as stated, or beyond rounding (V)."""
     if fit.points.noise_stated:
         return 1.0
-    return NUMERICAL_FLOOR * float(np.abs(fit.predicted).max())
+    return NUMERICAL_FLOOR * float(abs(fit.predicted).max())
 
 
 def stated_weights(points: ScanPoints, position_noise: float | FloatArray = 0.0) -> FloatArray:
@@ -489,7 +489,7 @@ def _why_undetermined(estimate: ProfileEstimate, *, shown: bool) -> str:
     varies = f"Beside a line the voltage varies by {varied}, {ratio:.3g} times its noise"
     if ratio < _LEAST_RISE:
         return f"{varies}: it does not rise above its noise as the indenter passes."
-    signal = np.abs(estimate.signal)
+    signal = abs(estimate.signal)
     farthest = np.argmax(estimate.distance)
     left = signal[farthest] / signal.max()
     if left > _LEFT:
@@ -543,7 +543,7 @@ def constrained_profile(
         # A profile that falls all the way to zero is nowhere negative.
         profile = np.append(profile[:-1] - profile[1:], profile[-1])
         columns = np.vstack([columns[:-1] - columns[1:], columns[-1:]])
-    scale = np.abs(profile).max()
+    scale = abs(profile).max()
     root = square_root(estimate.weighed.covariance)
     z = _least_distance(columns @ root / scale, -profile / scale - _SLACK)
     weighed = replace(estimate.weighed, mean=estimate.weighed.mean + root @ z)

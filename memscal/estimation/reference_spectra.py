@@ -113,7 +113,7 @@ def _last_wavenumber(reference: BaseStress, points: ScanPoints) -> float:
         last = _PASSED_OF_SOURCE / max(width, _narrowest_kernel(reference, points))
     k = np.linspace(0.0, last, _WAVENUMBERS)[1:]
     values = form.transform(k) if form else hankel_transform(reference.r, reference.sigma_zz, k)
-    size = np.abs(values)
+    size = abs(values)
     return float(k[size > _NOTHING * size.max()][-1])
 
 
@@ -142,7 +142,7 @@ def _table_spectrum(reference: StressProfile, k: FloatArray, span: float, order:
             "COLUMN), or leave it out to have the rod solved.",
         )
     needed = span / 2
-    tail = abs(stress[-1]) / np.abs(stress).max()
+    tail = abs(stress[-1]) / abs(stress).max()
     if reference.r[-1] < needed and tail > _DECAYED:
         raise InputError(
             f"The reference ends at r = {reference.r[-1] * 1e3:.4g} mm with {tail:.1%} of its "
@@ -158,7 +158,7 @@ def _table_spectrum(reference: StressProfile, k: FloatArray, span: float, order:
         )
     values = hankel_transform(reference.r, stress, k, order=order) / reference.load
     # Most of a shear, whatever the film, holds the film back.
-    if order and values[np.argmax(np.abs(values))] > 0:
+    if order and values[np.argmax(abs(values))] > 0:
         raise InputError(
             "The shear of the reference pulls the film outward.",
             why="sigma_rz is the traction of the base on the film, positive outward: a film that "

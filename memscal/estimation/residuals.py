@@ -207,7 +207,7 @@ def ring_test(
     # estimated; the least likely of several rings by Bonferroni.
     plane = np.zeros([np.ptp(i) + 1 for i in index])
     np.add.at(plane, tuple(i - i.min() for i in index), left)
-    power = np.abs(np.fft.fft2(plane)) ** 2 / (noise @ noise)
+    power = abs(np.fft.fft2(plane)) ** 2 / (noise @ noise)
     cycles = [np.fft.fftfreq(count) * max(plane.shape) for count in plane.shape]
     ring = np.rint(np.hypot.outer(*cycles)).astype(np.intp).ravel()
     count = np.bincount(ring)

@@ -127,7 +127,7 @@ def hysteresis_test(estimate: ProfileEstimate) -> BranchesApart | None:
     wider = estimate.conversion_constant * sigma * gaussian_transfer_slope(model.k, sigma)
     columns = [estimate.signal, model.signal(geometry, wider)]
     mean = np.bincount(points.scan, sign) / np.bincount(points.scan)
-    both = np.abs(mean)[points.scan] < np.abs(sign)
+    both = abs(mean)[points.scan] < abs(sign)
     if both.any():
         columns += [both * points.along(model.shift_derivative(geometry, estimate.kernel)), both]
     fit = _Fit.of(estimate, sign[:, None] * np.stack(columns, axis=1))
@@ -213,7 +213,7 @@ def compare_runs(estimate: ProfileEstimate) -> RunsApart | None:
     rows = others * (rows - rows.mean(axis=0))
     distances = others * (baselines - baselines.mean())
     errors = np.linalg.norm(rows, axis=1)
-    moved = int(np.argmax(np.abs(distances[:tests] / errors[:tests])))
+    moved = int(np.argmax(abs(distances[:tests] / errors[:tests])))
     offset = fit.tested(distances[[moved]], rows[[moved]], of=tests)
     run = number[fit.point]
     # Of scans without noise rounding is left.
@@ -221,10 +221,10 @@ def compare_runs(estimate: ProfileEstimate) -> RunsApart | None:
     square = np.bincount(run, fit.left**2 + floor**2, count)
     degrees = np.maximum(np.bincount(run, 1 - fit.leverage, count), 1.0)
     ratio = np.log(square / degrees / ((square.sum() - square) / (degrees.sum() - degrees)))
-    noisy = int(np.argmax(np.abs(ratio[:tests])))
+    noisy = int(np.argmax(abs(ratio[:tests])))
     louder = bool(ratio[noisy] > 0)
     pair = (degrees[noisy], degrees.sum() - degrees[noisy])
-    larger = float(np.exp(np.abs(ratio[noisy])))
+    larger = float(np.exp(abs(ratio[noisy])))
     noise = ratio_outcome(larger, *(pair if louder else pair[::-1]), of=2 * tests)
     distance = float(distances[moved])
     return RunsApart(count, offset, moved, distance, float(errors[moved]), noise, noisy, louder)

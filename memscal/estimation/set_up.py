@@ -190,7 +190,7 @@ def _farthest(scan: Scan, stress: BaseStress) -> SimpleNamespace:
     loads = np.atleast_1d(scan.stated_load if scan.normal_load is None else scan.normal_load)
     stated = [u for u in (scan.load_uncertainty, scan.normal_load_errors) if u is not None]
     spread = np.sqrt(sum((np.square(u) for u in stated), start=np.zeros(loads.shape)))
-    i = np.nanargmax(np.abs(loads - stress.load) - COVERAGE * spread)
+    i = np.nanargmax(abs(loads - stress.load) - COVERAGE * spread)
     uncertainty = spread.flat[i] if stated else None
     return SimpleNamespace(load=loads.flat[i], load_uncertainty=uncertainty)
 

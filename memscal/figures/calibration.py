@@ -140,7 +140,7 @@ def _shown_radius(radial: ApparatusRadial) -> float:
     """Return the radius to draw up to: where G, or its Gaussian, has died away."""
     peak = _peak(radial)
     last = float(radial.r[-1])
-    alive = np.flatnonzero(np.maximum(np.abs(radial.g), radial.g_gaussian) > 1e-3 * peak)
+    alive = np.flatnonzero(np.maximum(abs(radial.g), radial.g_gaussian) > 1e-3 * peak)
     gaussian_alive = np.flatnonzero(radial.g_gaussian > 1e-3 * peak)
     if not alive.size or not gaussian_alive.size:
         return last
@@ -190,8 +190,8 @@ def _draw_maps(figure: Figure, place: SubplotSpec, data: ApparatusData, loads: L
 def _draw_g(axes: Axes, data: ApparatusData) -> Axes:
     field = data.field
     reach = 5 * data.gaussian_sigma
-    x = np.abs(field.x) <= reach
-    y = np.abs(field.y) <= reach
+    x = abs(field.x) <= reach
+    y = abs(field.y) <= reach
     g = field.g[np.ix_(y, x)] / PER_MM2
     plane = (field.x[x] / MM, field.y[y] / MM, g)
     drawn = axes.pcolormesh(*plane, cmap="viridis", rasterized=True)

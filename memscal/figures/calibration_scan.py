@@ -189,7 +189,7 @@ def _as_curve(x: FloatArray, u: FloatArray) -> ArrayPair:
     """Return positions in order with one value for each, where repeats agree; else as given."""
     places, inverse = np.unique(x, return_inverse=True)
     mean = np.bincount(inverse, weights=u) / np.bincount(inverse)
-    agree = np.max(np.abs(u - mean[inverse])) <= 1e-3 * np.ptp(u)
+    agree = np.max(abs(u - mean[inverse])) <= 1e-3 * np.ptp(u)
     return (places, mean) if agree else (x, u)
 
 
@@ -243,7 +243,7 @@ def _seen_stress(data: ApparatusData) -> FloatArray | None:
     reference = data.reference
     factor = (data.load or reference.load) / reference.load
     if data.reading.relative:
-        factor = 1 / (np.abs(reference.sigma_zz).max() or 1.0)
+        factor = 1 / (abs(reference.sigma_zz).max() or 1.0)
     if not _tangential(data):
         return reference.sigma_zz * factor
     return None if reference.sigma_rz is None else -reference.sigma_rz * factor

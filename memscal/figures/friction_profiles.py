@@ -249,7 +249,7 @@ def _draw_residuals(
     z = (profile.s_zz - calculated) / profile.s_zz_errors
     look = mark(at_load.lubrication, colour) | {"ls": "none", "ms": 2.5, "mew": 0.6}
     draw_measured(axes, profile.r / MM, z, None, many=z.size > SCATTER_THRESHOLD, **look)
-    return float(np.abs(z).max())
+    return float(abs(z).max())
 
 
 def friction_set_figure(comparison: FrictionComparison, lubrication: str) -> Figure:
@@ -305,7 +305,7 @@ def friction_set_figure(comparison: FrictionComparison, lubrication: str) -> Fig
 
 def _shown_indices(comparison: FrictionComparison) -> list[int]:
     """Return indices of the coefficients to draw: some of them, the ends always."""
-    nearest = {int(np.argmin(np.abs(comparison.friction - mu))) for mu in _SHOWN}
+    nearest = {int(np.argmin(abs(comparison.friction - mu))) for mu in _SHOWN}
     return sorted(nearest | {0, comparison.friction.size - 1})
 
 

@@ -158,8 +158,8 @@ def _draw_stress(axes: Axes, restored: Restoration) -> None:
 def _draw_residuals(axes: Axes, restored: Restoration) -> None:
     """Draw residuals over their noise; those beyond the axis are drawn at its edge."""
     z = restored.residual / restored.noise
-    limit = max(_LEAST_LIMIT, min(1.1 * np.abs(z).max(), 8.0))
-    ordinary = np.abs(z) <= limit
+    limit = max(_LEAST_LIMIT, min(1.1 * abs(z).max(), 8.0))
+    ordinary = abs(z) <= limit
     along = "x" if restored.points.free[0, 0] else "y"
     side = getattr(restored.points, along) / MM
     draw_residual_band(axes)

@@ -157,7 +157,7 @@ def _checked_friction(profile: StressProfile, reach: float) -> float:
             f"{_name(profile)} does not say its friction coefficient.",
             cure="State it when the table is imported (--friction).",
         )
-    size = np.abs(profile.sigma_zz)
+    size = abs(profile.sigma_zz)
     tail = size[-1] / size.max()
     if profile.r[-1] < reach and tail > _DECAYED:
         end = profile.r[-1] * 1e3

@@ -483,7 +483,7 @@ def channels_of(
     channels = {}
     for loading, family in families.items():
         sensor = sensor_of(apparatus, family, reach, measured.scans, common)
-        nearest = [np.abs(family.loads - load).argmin() for load in measured.loads]
+        nearest = [abs(family.loads - load).argmin() for load in measured.loads]
         channels[loading] = Channel(points, sensor, family.only(nearest))
     return channels
 

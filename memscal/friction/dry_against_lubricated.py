@@ -156,7 +156,7 @@ def _common_places(dry: FloatArray, lubricated: FloatArray) -> tuple[IndexArray,
     middles = (lubricated[1:] + lubricated[:-1]) / 2
     nearest = np.searchsorted(middles, dry)
     step = np.median(np.diff(dry)) if dry.size > 1 else 0.0
-    close = np.flatnonzero(np.abs(dry - lubricated[nearest]) < _CLOSE * step)
+    close = np.flatnonzero(abs(dry - lubricated[nearest]) < _CLOSE * step)
     matched, first = np.unique(nearest[close], return_index=True)
     return close[first], matched
 

@@ -143,7 +143,7 @@ def fit_friction(channel: Channel, *shear: Channel) -> FrictionFit:
     nodes = family.coordinates
     even = np.linspace(nodes[0], nodes[-1], _FINE)
     step = even[1] - even[0]
-    distances = np.abs(np.subtract.outer(even, nodes)).min(axis=1)
+    distances = abs(np.subtract.outer(even, nodes)).min(axis=1)
     between = unbounded(even[distances > 0.2 * step], family.scale)
     # The family's own values are kept as they are, not as their coordinates give them back.
     values = np.sort([*family.values, *between])

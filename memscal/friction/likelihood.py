@@ -70,7 +70,7 @@ class LoadPoints:
     @property
     def radius(self) -> FloatArray:
         """Distance from the centre, in m."""
-        return np.abs(self.offset)
+        return abs(self.offset)
 
     def shared_noise(self) -> tuple[IndexArray, Arrays]:
         """Order of the readings, and correlations (m, m) of kinds of noise in m that follow."""
@@ -266,7 +266,7 @@ def sensor_of(
         # Any rotation of independent changes is another set of them: in this one few matter.
         radii = np.linspace(0.0, reach, _RADII)
         middle = family.spectra[family.values.size // 2]
-        largest = np.abs(middle).max(axis=1) if family.order else middle[:, 0]
+        largest = abs(middle).max(axis=1) if family.order else middle[:, 0]
         signals = [
             nodes.synthesise(shape[:, None] * changes, radii, order=family.order)
             for shape in middle / largest[:, None]
@@ -478,7 +478,7 @@ def standardise(points: LoadPoints, predicted: Predicted) -> Standardised:
     scaled = whitened(np.concatenate(vectors, axis=-1))
     projected = scaled - basis @ (np.swapaxes(basis, -1, -2) @ scaled)
     # The diagonals of triangular roots give the determinants.
-    pivots = np.abs(np.diagonal(triangle, axis1=-2, axis2=-1))
+    pivots = abs(np.diagonal(triangle, axis1=-2, axis2=-1))
     log_flat = 2 * np.log(pivots).sum(axis=-1)
     pivots = np.diagonal(root, axis1=-2, axis2=-1)
     log_noise = -2 * np.log(pivots).sum(axis=(-2, -1))

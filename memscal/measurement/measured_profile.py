@@ -247,7 +247,7 @@ def prepared_scan(scan: Scan, apparatus: ApparatusFunction, signal: ContactSigna
         found = find(level, apparatus)
         distance = np.hypot(x - found.centre[0], y - found.centre[1])
         slope = np.interp(distance, signal.r, _slope(signal, found))
-        load_noise = np.abs(slope) * load_share
+        load_noise = abs(slope) * load_share
         electronic = stated
         if scan.u_zz_errors is None and load_noise.any():
             noise = _electronic_noise(found, load_noise[np.isfinite(level.u_zz)])
@@ -301,8 +301,8 @@ def _electronic_noise(found: _Found, load_noise: FloatArray) -> float:
     residual = found.residual
     # The fitted parameters lower the scatter of the residuals.
     square = found.weight * residual**2 * residual.size / max(residual.size - found.parameters, 1)
-    scatter = 1.4826 * np.median(np.abs(residual))
-    tried = np.maximum(_TRIED * scatter, NUMERICAL_FLOOR * np.abs(found.signal).max())
+    scatter = 1.4826 * np.median(abs(residual))
+    tried = np.maximum(_TRIED * scatter, NUMERICAL_FLOOR * abs(found.signal).max())
     variance = tried[:, None] ** 2 + load_noise**2
     deviance = np.sum(np.log(variance) + square / variance, axis=1)
     return float(tried[np.argmin(deviance)])
@@ -472,7 +472,7 @@ def _on_axis(restored: Restoration) -> tuple[float, Mapping[str, float]]:
         by_kernel = on_axis * posterior.stress @ by_kernel / apparatus.conversion_constant
         changes[source] = changes[source] + by_kernel
     variance = row @ posterior.covariances["scan"][:nodes, :nodes] @ row
-    budget = {"noise": float(np.sqrt(max(variance, 0.0)))}
+    budget = {"noise": math.sqrt(max(variance, 0.0))}
     for source, change in changes.items():
         budget[source] = float(np.linalg.norm(change))
     return float(row @ posterior.stress), budget

@@ -252,12 +252,12 @@ def fitted_shapes(shapes: Sequence[PressureShape], start: ProfileEstimate) -> li
         forces, steps, *_ = (inverse @ data).T
         # A step that turns back is half as long as the last, so that no width swings for ever.
         ahead = steps * width / widths
-        longest = np.where(ahead * growth < 0, np.abs(growth) / 2, _LONGEST)
+        longest = np.where(ahead * growth < 0, abs(growth) / 2, _LONGEST)
         growth = np.clip(ahead, -longest, longest)
         widths = widths * (1 + growth)
-        if np.abs(ahead).max() < _SETTLED:
+        if abs(ahead).max() < _SETTLED:
             break
-    settled = (forces > 0) & (np.abs(ahead) < _SETTLED)
+    settled = (forces > 0) & (abs(ahead) < _SETTLED)
     settled &= (widths > width / _FARTHEST) & (widths < width * _FARTHEST)
     forces = np.where(settled, forces, force)
     widths = np.where(settled, widths, width)

@@ -292,7 +292,7 @@ class Restoration(Result, Checked):
 
     def _synthesis(self, r: ArrayLike) -> FloatArray:
         """Matrix from the transform at the nodes to values at radii."""
-        radii = np.abs(floats(r))
+        radii = abs(floats(r))
         reach = reach_of(self.points)
         if not np.all(radii <= reach):
             raise InputError(
@@ -321,8 +321,8 @@ def _compared(restored: Restoration, stress: BaseStress) -> StressComparison:
     else:
         spectrum = hankel_transform(stress.r, stress.sigma_zz, wavenumbers.k) / stress.load
     calculated = scan.stated_load * wavenumbers.synthesise(spectrum, restored.r)
-    peak = np.abs(calculated).max()
-    apart = np.abs(restored.sigma_zz - calculated)
+    peak = abs(calculated).max()
+    apart = abs(restored.sigma_zz - calculated)
     chi_square, degrees = _direct(restored, spectrum)
     return StressComparison(
         stress=stress,

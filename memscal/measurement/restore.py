@@ -114,7 +114,7 @@ def _line_load(scan: Scan, loads: FloatArray, line: str) -> float:
             cure="State the loads, or leave normal_load out where there is one nominal load only.",
         )
     load = float(np.median(recorded))
-    if np.abs(recorded - load).max() > _SCATTER * load:
+    if abs(recorded - load).max() > _SCATTER * load:
         raise InputError(
             f"{place_of(scan)}{line}: its loads go from {recorded.min():.4g} to "
             f"{recorded.max():.4g} N.",

@@ -68,7 +68,7 @@ def spherical_bessel(count: int, x: FloatArray) -> FloatArray:
         below = (2 * order + 1) / x * current - above
         above = current
         current = below
-        size = np.abs(current)
+        size = abs(current)
         if np.max(size, initial=0.0) > 1e100:
             scale = 1 / np.maximum(size, 1.0)
             above = above * scale
@@ -254,7 +254,7 @@ def _largest_change(fine: RodSolution, coarse: RodSolution, ratio: float, nu: fl
     film = ElasticFilm(young_modulus=2.0**20, poisson_ratio=nu, thickness=h)
     r = h * np.linspace(0.0, ratio + 4.0, 60)
     new, old = (base_stress(film, rod.traction(h * ratio, 1.0), r) for rod in (fine, coarse))
-    by_stress = np.max(np.abs(new - old)) / np.max(np.abs(new))
+    by_stress = np.max(abs(new - old)) / np.max(abs(new))
     return float(max(by_stress, abs(fine.stiffness_factor / coarse.stiffness_factor - 1)))
 
 

@@ -277,7 +277,7 @@ def _change(request: RingRequest, fine: Contact, coarse: Contact) -> float:
 def relative_change(fine: Contact, coarse: Contact, r: FloatArray) -> float:
     """Return the largest relative change of base stress at ``r`` (m), load and depth."""
     stress = fine.base_stress(r)
-    by_stress = np.max(np.abs(stress - coarse.base_stress(r))) / np.max(np.abs(stress))
+    by_stress = np.max(abs(stress - coarse.base_stress(r))) / np.max(abs(stress))
     by_load = abs(coarse.load / fine.load - 1)
     by_depth = abs(coarse.depth / fine.depth - 1)
     return float(max(by_stress, by_load, by_depth))

@@ -290,7 +290,7 @@ def _revise(
     law = problem.interface.normal_law
     if not law:
         # Let go of rings that pull, and catch rings that would pass through the indenter.
-        pull = -p / np.abs(p).max(initial=1e-300)
+        pull = -p / abs(p).max(initial=1e-300)
         overlap = -separation / max(abs(trial.depth), 1e-300)
         wrong = np.where(status.pressing, pull, overlap)
         if held is not None:
@@ -308,7 +308,7 @@ def _revise(
         pressing = _bearing(problem, law, separation)
     stretch = status.stretch
     if not problem.interface.rigid:
-        settled &= np.abs(p - status.pressure).max() <= _SETTLED * p.max()
+        settled &= abs(p - status.pressure).max() <= _SETTLED * p.max()
         length = problem.interface.slip_length
         stretch = np.clip(trial.outward - status.anchor, -length, length)
     return _Status(pressing, slip, status.anchor, separation, p, stretch), settled
@@ -335,15 +335,15 @@ def _revised_slip(
     sticks = status.slip == 0
     stretch = u - status.anchor
     length = problem.interface.slip_length
-    excess = (np.abs(q) - mu * p) / (mu * np.abs(trial.pressure).max())
+    excess = (abs(q) - mu * p) / (mu * abs(trial.pressure).max())
     # A slipping ring stretches the interface by its slip length, against the shear; on the axis
     # nothing slips.
-    pushed = (status.slip * stretch + length) / (np.abs(u).max() + length)
+    pushed = (status.slip * stretch + length) / (abs(u).max() + length)
     pushed *= problem.compliance.r > 0
     changing = _changing(np.where(sticks, excess, pushed) * status.pressing, careful)
     # A ring that friction would push on far enough to slip back does so at once (the trial shear
     # of Alart and Curnier); sticking first, it could go back and forth for ever.
     turn = 2 * mu * p * problem.compliance.radial
-    turns = np.abs(stretch) > np.maximum(turn, length)
+    turns = abs(stretch) > np.maximum(turn, length)
     turned = np.where(turns, -np.sign(stretch), 0)
     return np.where(changing, np.where(sticks, np.sign(q), turned), status.slip)
