@@ -134,7 +134,7 @@ def _sizes(effect: Influence, results: Results) -> dict[str, float]:
     """Sizes of an influence, of the sign that needs less, that move each parameter by its u."""
     parameters = results.parameters
     squared = np.broadcast_to(effect.squared, effect.voltage.shape)
-    moved = abs(results.by_voltage @ np.stack([effect.voltage, squared], axis=1))
+    moved = abs(results.by_voltage @ np.column_stack([effect.voltage, squared]))
     sizes = {}
     for parameter in MOVED:
         row = parameters.names.index(parameter)

@@ -158,7 +158,7 @@ def _input_columns(solution: Solution, without: str = "") -> FloatArray:
         _, load, u = balance
         weighed = np.array([other == balance for other in balances])[estimate.points.scan]
         columns.append(np.where(weighed, estimate.signal * (u or 0.0) / load, 0.0))
-    return np.stack(columns, axis=1)
+    return np.column_stack(columns)
 
 
 @value_record

@@ -294,7 +294,7 @@ def propagate(
     independent = list(columns.values())
     count = len(names)
     if effects:
-        changes = by_voltage @ np.stack([effect.voltage for effect in effects.values()], axis=1)
+        changes = by_voltage @ np.column_stack([effect.voltage for effect in effects.values()])
         # No factor changes G and its transfer, beyond the named numbers.
         scaled = [name.startswith("conversion_constant") for name in names]
         for (source, effect), column in zip(effects.items(), changes.T, strict=True):

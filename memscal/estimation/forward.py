@@ -236,7 +236,7 @@ class ForwardModel:
         columns = []
         for inside, free in zip(self.points.inside, self.points.free, strict=True):
             columns += [inside, *(self._within[free] * inside)]
-        return np.stack(columns, axis=1)
+        return np.column_stack(columns)
 
     @cached_property
     def reach(self) -> float:
@@ -325,7 +325,7 @@ class ForwardModel:
         """Derivatives by the free coordinates of all centres (n, m), of those by each point's."""
         scan = self.points.scan
         free = np.argwhere(self.points.free)
-        return np.stack([np.where(scan == i, shift[axis], 0.0) for i, axis in free], axis=1)
+        return np.column_stack([np.where(scan == i, shift[axis], 0.0) for i, axis in free])
 
     def elliptic(self, geometry: Geometry, ellipses: FloatArray) -> ArrayPair:
         """Responses (m, n) per A to (s, e1, e2), (m, 3); slopes (2, n) of the first by place."""

@@ -178,7 +178,7 @@ def _trial_centres(model: ForwardModel) -> FloatArray:
         if points.missing:  # at a ceiling, those at the centre
             central = np.union1d(central, np.arange(central[0], central[-1], points.step))
         along[axis] = central[:: int(np.ceil(central.size / (12 if points.planar else 40)))]
-    return np.stack([axis.ravel() for axis in np.meshgrid(*along)], axis=1)
+    return np.column_stack([axis.ravel() for axis in np.meshgrid(*along)])
 
 
 def _smoothing_length(model: ForwardModel) -> float:
@@ -377,7 +377,7 @@ def linearise(model: ForwardModel, theta: FloatArray) -> GaussianFit:
         shift = amplitude * shift
     else:
         shift = model.shift_derivative(geometry, amplitude * kernel)
-        both = np.stack([kernel, gaussian_transfer_slope(model.k, sigma)], axis=1)
+        both = np.column_stack([kernel, gaussian_transfer_slope(model.k, sigma)])
         columns = model.signal(geometry, both)
     signal = columns[:, :1]
     by_shape = amplitude * columns[:, 1 : 2 + points.ellipse]

@@ -509,7 +509,7 @@ def _why_undetermined(estimate: ProfileEstimate, *, shown: bool) -> str:
     blocks = {
         "the baseline: the scan is too short to show the profile's tail": everything[centres:flat],
         "the width and shape of the apparatus function: the reference is too wide, or the step too "
-        "coarse, to determine them": np.concatenate([[1], everything[flat:]]),
+        "coarse, to determine them": np.append(1, everything[flat:]),
     }
     confused = max(blocks, key=lambda name: _share(estimate, blocks[name]))
     return f"{varies}, but the conversion constant cannot be told from {confused}."

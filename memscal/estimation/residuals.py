@@ -181,7 +181,7 @@ def pure_error_test(estimate: ProfileEstimate, model: FreeModel) -> TestOutcome 
 
     def within(columns: FloatArray) -> FloatArray:
         """Subtract from each column its weighted mean at each place."""
-        sums = np.stack([np.bincount(group, weight * c) for c in columns.T], axis=1)
+        sums = np.column_stack([np.bincount(group, weight * c) for c in columns.T])
         return columns - weight[:, None] * (sums / square[:, None])[group]
 
     moved = within(model.basis)

@@ -130,7 +130,7 @@ def hysteresis_test(estimate: ProfileEstimate) -> BranchesApart | None:
     both = abs(mean)[points.scan] < abs(sign)
     if both.any():
         columns += [both * points.along(model.shift_derivative(geometry, estimate.kernel)), both]
-    fit = _Fit.of(estimate, sign[:, None] * np.stack(columns, axis=1))
+    fit = _Fit.of(estimate, sign[:, None] * np.column_stack(columns))
     if not fit:
         return None
     values = fit.coefficients[-len(columns) :]

@@ -118,7 +118,7 @@ class ProfileFamily(FrozenArrays):
         numbers: Values = {}
         for name in _NUMBERS:
             columns = [np.interp(t, nodes, column) for column in getattr(self, name).T]
-            numbers[name] = np.stack(columns, axis=1)
+            numbers[name] = np.column_stack(columns)
         return replace(
             self,
             values=chosen,

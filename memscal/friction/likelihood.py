@@ -149,7 +149,7 @@ def load_points(profile: MeasuredProfile, channel: str = "zz") -> LoadPoints:
         noise=points.noise / np.sqrt(points.weight),
         load_errors=points.load_errors / profile.load,
         x_errors=points.x_errors,
-        flat=np.stack([np.ones_like(position), drift], axis=1),
+        flat=np.column_stack([np.ones_like(position), drift]),
         load_share=(profile.load_uncertainty or 0.0) / profile.load,
         position_share=profile.scan.position_scale_uncertainty or 0.0,
         gain_share=profile.scan.gain_uncertainty or 0.0,

@@ -101,7 +101,7 @@ def _signals_of_path(loads: Sequence[Scan], apparatus: ApparatusFunction) -> lis
         spectra = []
         for path in paths:
             spectra += [transfer * path[i].base_spectrum(nodes.k) for i in three]
-        voltages = nodes.synthesise(np.stack(spectra, axis=1), r).T
+        voltages = nodes.synthesise(np.column_stack(spectra), r).T
         voltages = voltages.reshape(-1, near.size, r.size)
         # Without friction both are the frictionless contact.
         below, at, above = np.moveaxis(voltages[[0, -1]], 1, 0)

@@ -358,7 +358,7 @@ def posterior_of(
     wavenumbers = model.reference.wavenumbers
     set_up = scan.set_up.expected
     film = film_transfer(set_up, wavenumbers)
-    scale = np.concatenate([scan.stated_load * film, np.ones(mean.size - nodes)])
+    scale = np.append(scan.stated_load * film, np.ones(mean.size - nodes))
     film_changes = _film_changes(set_up, wavenumbers)
     shared = shared_changes(apparatus, [scan], model.k)
     # One error of a film that sensor and contact share changes A G and the film's transfer.

@@ -223,7 +223,7 @@ class Contact(Result):
     def _default_profile(self) -> StressProfile:
         near = np.arange(0.0, self.contact_radius / self.film.thickness + _NEAR_REACH, _NEAR_STEP)
         far = near[-1] + np.arange(_FAR_STEP, _FAR_REACH - _NEAR_REACH, _FAR_STEP)
-        radii = np.concatenate([near, far]) * self.film.thickness
+        radii = np.append(near, far) * self.film.thickness
         sigma_zz = abs(self.base_stress(radii))
         last = np.flatnonzero(sigma_zz >= _PROFILE_FLOOR * sigma_zz.max())[-1] + 2
         return self.profile(radii[:last])

@@ -55,7 +55,7 @@ def film_triangles(rings: FloatArray, *, radius: float, refinement: int = 1) -> 
     inside = _fitted(rings, sizes)
     growth = 1 + _GROWTH / refinement
     beyond = graded(rings[-1], radius, rings[-1] - inside[-2], growth, sizes.widest)
-    front = _Front(np.concatenate([inside, beyond[1:]]), sizes)
+    front = _Front(np.append(inside, beyond[1:]), sizes)
     while np.any(front.depth < 1.0):
         front.advance()
     return TriangleMesh(np.array(front.points), np.array(front.triangles, np.int64))

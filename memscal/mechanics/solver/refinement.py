@@ -43,7 +43,7 @@ def _rings(request: RingRequest, edges: Sequence[float], reach: float, count: in
     distance = r - near[np.searchsorted((near[1:] + near[:-1]) / 2, r)]
     # Where the number of rings passed so far is whole, there is one.
     density = 1 / np.minimum(spacing, np.hypot(_FINEST * spacing, _GROWTH * distance))
-    passed = np.concatenate([[0.0], np.cumsum(np.diff(r) / 2 * (density[1:] + density[:-1]))])
+    passed = np.append(0.0, np.cumsum(np.diff(r) / 2 * (density[1:] + density[:-1])))
     return np.interp(np.arange(math.floor(passed[-1]) + 1), passed, r)
 
 

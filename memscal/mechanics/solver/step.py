@@ -55,7 +55,7 @@ class ContactProblem:
 
     def displacements(self, p: FloatArray, q: FloatArray) -> ArrayPair:
         """Return depression and outward displacement (m) under tractions (Pa) at the rings."""
-        both = self.compliance.whole @ np.concatenate([p, q])
+        both = self.compliance.whole @ np.append(p, q)
         return both[: p.size], both[p.size :]
 
     def separations(self, state: ContactState) -> FloatArray:
@@ -149,7 +149,7 @@ def _solve_system(problem: ContactProblem, status: _Status, goal: Goal) -> _Tria
     # row is the goal's, from the start that of a ring which the surfaces are to meet.
     unit = c.whole[0, 0]
     ring = goal.ring if isinstance(goal, Touch) else 0
-    unknown = np.concatenate([rows, n + stuck])
+    unknown = np.append(rows, n + stuck)
     equations = c.whole.take(np.append(unknown, ring), axis=0)
     matrix = np.zeros((equations.shape[0], equations.shape[0]))
     matrix[:, :-1] = equations.take(unknown, axis=1)
