@@ -114,17 +114,18 @@ def _reconvolutions(solution: Solution) -> _Checks:
         else "the regularisation has removed something that the scan shows (see method bayesian)"
     )
     fitted = solution.gaussian_misfit
+    degrees = fitted.degrees
     p_value = None
     if solution.estimate.points.noise_stated:
-        p_value = float(chdtrc(fitted.degrees, fitted.chi2_reduced * fitted.degrees))
+        p_value = float(chdtrc(degrees, fitted.chi2_reduced * degrees))
     # Both are of the same points; the noise is stated, or is known by degrees of its own.
-    limit = chi_square_limit(fitted.degrees)
+    limit = chi_square_limit(degrees)
     noise = solution.estimate.raster_noise
     if noise:
         # What the noise was estimated from is a part of the misfit: the rest of it is independent.
-        rest = max(fitted.degrees - noise.degrees, 1.0)
+        rest = max(degrees - noise.degrees, 1.0)
         limit = noise.degrees + rest * float(fdtri(rest, noise.degrees, 1 - FALSE_ALARM))
-    limit /= fitted.degrees
+    limit /= degrees
     yield check(
         "reconvolution",
         solution.deconvolution.misfit.chi2_reduced,

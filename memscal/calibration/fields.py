@@ -89,8 +89,9 @@ class LineFields:
         cls, estimate: ProfileEstimate, spectrum: RadialSpectrum, choice: GridChoice
     ) -> LineFields:
         """Lift the profile of the voltages, by its transform, and the reference."""
-        cells = scipy.fft.next_fast_len(int(np.ceil(choice.extent / choice.spacing)), real=True)
-        grid = EvenGrid(cells + 1, choice.spacing)
+        spacing = choice.spacing
+        cells = scipy.fft.next_fast_len(int(np.ceil(choice.extent / spacing)), real=True)
+        grid = EvenGrid(cells + 1, spacing)
         reference = estimate.model.reference
         if reference.source:
             # The grid does not sample the edge of a source, but its transform.
@@ -102,8 +103,8 @@ class LineFields:
             arrays = (a.tobytes() for a in (nodes.k, nodes.weights, reference.scalar.values))
             lifted = _lifted if grid.count < _MOST_KEPT else _lifted.__wrapped__
             stress = lifted(grid, *arrays)
-            voltage = Field(grid, on_grid(spectrum.scalar.at, grid, choice.spacing / 2))
-        inside = EvenGrid(round(choice.support / choice.spacing) + 1, choice.spacing)
+            voltage = Field(grid, on_grid(spectrum.scalar.at, grid, spacing / 2))
+        inside = EvenGrid(round(choice.support / spacing) + 1, spacing)
         support = (inside.count - 1) * inside.spacing
         confinement = cosine_taper(grid.radius, support)
         return cls(grid, voltage, stress, support, inside, confinement, estimate.distance)
@@ -228,12 +229,13 @@ class RasterFields:
         np.subtract.at(profiled, self.index, share * smoothed.estimate.points.load)
         radius = self.grid.radius
         table = wave_table(0, False, radius.max(), smoothed.estimate.model.k.tobytes())
+        coefficients = table.spline.c
         everywhere = table.interpolation(radius.ravel())
         # J0(k r) J0(k' r) over what has something of the profile, by the table's splines.
-        both = (everywhere.T @ everywhere.multiply(profiled.reshape(-1, 1))) @ table.spline.c
-        elsewhere = (table.spline.c.T @ both) * smoothed.spectrum.wavenumbers.weights
+        both = (everywhere.T @ everywhere.multiply(profiled.reshape(-1, 1))) @ coefficients
+        elsewhere = (coefficients.T @ both) * smoothed.spectrum.wavenumbers.weights
         own = table.interpolation(radius[self.index]).multiply(share[:, None]).tocsr()
-        by_points = VoltageMap(((table.spline.c.T, own),))
+        by_points = VoltageMap(((coefficients.T, own),))
         by_profile: VoltageMap = elsewhere @ smoothed.gain
         return (by_points + by_profile) * self.grid.cell_area
 

@@ -273,15 +273,16 @@ class ForwardModel:
         """Columns (n, b + f): the ``first``, then F; and C (f, nodes): kernels K make F C K."""
         # By singular values: a film transmits few combinations of all waves.  No F and C where
         # there are not more points than columns.
-        if self.points.u.size <= DENSE or not self.sums_waves:
+        points = self.points
+        if points.u.size <= DENSE or not self.sums_waves:
             return np.hstack(first), None
         strongest = np.abs(self._measures).max(axis=0)
         reach = _REACHES * geometry.radius.max() / geometry.reach
-        table = (self.points.order, geometry.across, geometry.reach, self.k.tobytes())
+        table = (points.order, geometry.across, geometry.reach, self.k.tobytes())
         size, right, splines = _seen_waves(*table, int(np.ceil(reach)), strongest.tobytes())
         interpolation = geometry.interpolation(self.k.size)
-        factor = self.points.load
-        if self.points.order:
+        factor = points.load
+        if points.order:
             factor = -factor * geometry.towards[self.axis]
         start = sum(columns.shape[1] for columns in first)
         columns = np.zeros((factor.size, start + size.size * len(self.alike)))
@@ -289,7 +290,7 @@ class ForwardModel:
         np.concatenate(first, axis=1, out=columns[:, :start])
         for scans in self.alike:
             place = slice(start, start + size.size)
-            own_factor = np.where(np.isin(self.points.scan, scans), factor, 0.0)
+            own_factor = np.where(np.isin(points.scan, scans), factor, 0.0)
             for block in slices(factor.size, BLOCK):
                 waves = interpolation[block] @ splines
                 columns[block, place] = waves * own_factor[block, None]
@@ -323,9 +324,9 @@ class ForwardModel:
 
     def by_free_centres(self, shift: FloatArray) -> FloatArray:
         """Derivatives by the free coordinates of all centres (n, m), of those by each point's."""
-        scan = self.points.scan
+        inside = self.points.inside
         free = np.argwhere(self.points.free)
-        return np.column_stack([np.where(scan == i, shift[axis], 0.0) for i, axis in free])
+        return np.column_stack([np.where(inside[i], shift[axis], 0.0) for i, axis in free])
 
     def elliptic(self, geometry: Geometry, ellipses: FloatArray) -> ArrayPair:
         """Responses (m, n) per A to (s, e1, e2), (m, 3); slopes (2, n) of the first by place."""

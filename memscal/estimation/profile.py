@@ -365,8 +365,9 @@ def _weighed(
         signal = fit.jacobian[:, 0]
         variance = variances_nearby(fit.points, left)[signal > _SEEN * signal.max()].mean()
         if variance <= _EVEN * noise**2:
-            found = about_centre.log_marginals
-            return free_basis, replace(weighed, log_marginals=found, free=free_weighing.evidence)
+            return free_basis, replace(
+                weighed, log_marginals=about_centre.log_marginals, free=free_weighing.evidence
+            )
     return basis, about_centre.average()
 
 

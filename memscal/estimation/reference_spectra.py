@@ -78,12 +78,13 @@ def reference_spectra(
 
 
 def _spectrum(stress: BaseStress, wavenumbers: Wavenumbers, points: ScanPoints) -> RadialSpectrum:
+    order = points.order
     if isinstance(stress, Contact):
-        values = _base_spectrum(stress, wavenumbers.k.tobytes(), points.order) / stress.load
-        return RadialSpectrum(wavenumbers, values, points.order)
-    if not stress.form or points.order:
-        values = _table_spectrum(stress, wavenumbers.k, points.span, points.order)
-        return RadialSpectrum(wavenumbers, values, points.order)
+        values = _base_spectrum(stress, wavenumbers.k.tobytes(), order) / stress.load
+        return RadialSpectrum(wavenumbers, values, order)
+    if not stress.form or order:
+        values = _table_spectrum(stress, wavenumbers.k, points.span, order)
+        return RadialSpectrum(wavenumbers, values, order)
     values = stress.form.transform(wavenumbers.k) / stress.load
     if stress.ideal and stress.ideal.shape == "slit":
         if points.planar:

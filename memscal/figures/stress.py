@@ -44,11 +44,12 @@ _DECADES = 1e-3
 def measured_stress_figure(measured: MeasuredStress) -> Figure:
     """Draw the measured profiles of all loads against the distance from the centre."""
     # Dots of many points have no bars.
-    many = min(profile.r.size for profile in measured.profiles) > SCATTER_THRESHOLD
+    profiles = measured.profiles
+    many = min(profile.r.size for profile in profiles) > SCATTER_THRESHOLD
     with panels_of(3.6, 1, 2, "" if many else COVERAGE_NOTE) as (figure, panels):
         linear, logarithmic = panels
-        looks = load_looks(profile.load for profile in measured.profiles)
-        for profile in measured.profiles:
+        looks = load_looks(profile.load for profile in profiles)
+        for profile in profiles:
             colour, _ = looks[profile.load]
             clear = profile.s_zz > coverage() * profile.s_zz_errors
             _draw(linear, profile, colour, np.ones_like(clear))
@@ -61,7 +62,7 @@ def measured_stress_figure(measured: MeasuredStress) -> Figure:
         logarithmic.set_title(
             f"logarithmic scale; pale: less than {coverage():g}u", fontsize=8, loc="left"
         )
-        top = max(profile.s_zz.max() for profile in measured.profiles) / KPA
+        top = max(profile.s_zz.max() for profile in profiles) / KPA
         logarithmic.set_yscale("log")
         logarithmic.set_ylim(_DECADES * top, 1.6 * top)
         logarithmic.yaxis.set_major_formatter("{x:g}")
@@ -70,7 +71,7 @@ def measured_stress_figure(measured: MeasuredStress) -> Figure:
             Line2D([], [], color=colour, lw=2.0, label=name)
             for colour, name in dict.fromkeys(looks.values())
         ]
-        for state in dict.fromkeys(profile.lubrication for profile in measured.profiles):
+        for state in dict.fromkeys(profile.lubrication for profile in profiles):
             look = mark(state, "0.2")
             words = state or "measured"
             if many:

@@ -455,8 +455,8 @@ def compare_measured(
     pairs = lubricated_pairs(measured.profiles)
     differences = (dry_against_lubricated(measured, frictionless, pair) for pair in pairs)
 
-    stated = measured.noise_stated
-    checks = (*measured.checks, *comparison_checks(loads, joint, noise_stated=stated))
+    own = comparison_checks(loads, joint, noise_stated=measured.noise_stated)
+    checks = (*measured.checks, *own)
     return FrictionComparison(
         measured=measured,
         friction=first.family.values,

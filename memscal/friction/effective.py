@@ -244,8 +244,7 @@ def fit_together(
                 joint[lubrication][loading] = fit.coefficient_beside(
                     chosen, held, lubricated_friction
                 )
-    tested = measured.noise_stated
-    return {kind: with_loading(held, tested=tested) for kind, held in joint.items()}
+    return {kind: with_loading(held, tested=measured.noise_stated) for kind, held in joint.items()}
 
 
 def load_comparison(profile: MeasuredProfile, fit: FrictionFit, index: int) -> LoadComparison:

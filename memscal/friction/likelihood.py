@@ -74,6 +74,7 @@ class LoadPoints:
 
     def shared_noise(self) -> tuple[IndexArray, Arrays]:
         """Order of the readings, and correlations (m, m) of kinds of noise in m that follow."""
+        places = self.places
         order = np.arange(self.u.size)
         shared = {}
         if self.correlation is not None:
@@ -81,13 +82,13 @@ class LoadPoints:
         if self.contacts is not None:
             shared["load_scatter"] = self.contacts @ self.contacts.T
             shared["position"] = shared["load_scatter"]
-        if self.places is not None:
-            readings = self.places.sum(axis=0)
+        if places is not None:
+            readings = places.sum(axis=0)
             most = int(readings.max())
             if shared or np.ptp(readings):
-                shared["position"] = self.places @ self.places.T
+                shared["position"] = places @ places.T
             elif most > 1:
-                order = np.argsort(self.places.argmax(axis=1), kind="stable")
+                order = np.argsort(places.argmax(axis=1), kind="stable")
                 shared["position"] = np.ones((most, most))
         return order, shared
 
@@ -249,7 +250,8 @@ def sensor_of(
     # What the contacts' ``scans`` share with the calibration, film and load cell, counts once, as
     # do ``common`` inputs of the calibrations of two channels.
     nodes = family.wavenumbers
-    known = shared_changes(apparatus, scans, nodes.k)
+    k = nodes.k
+    known = shared_changes(apparatus, scans, k)
     shared = {name: change for name, change in known.items() if name in (*family.changes, "load")}
     alike = []
     if all(scan.stage.same_as(apparatus.stage) for scan in scans):
@@ -257,10 +259,10 @@ def sensor_of(
     # The sensor is the same, and so is its chain.
     if all(scan.gain_uncertainty is not None for scan in scans):
         alike.append("gain")
-    shared |= input_changes(apparatus, alike, nodes.k)
+    shared |= input_changes(apparatus, alike, k)
     inputs = [name for name in common if name not in shared]
-    calibration = input_changes(apparatus, inputs, nodes.k)
-    transfer, changes = sensor_changes(apparatus, nodes.k, [*shared, *calibration])
+    calibration = input_changes(apparatus, inputs, k)
+    transfer, changes = sensor_changes(apparatus, k, [*shared, *calibration])
     shared |= {f"calibration_{name}": change for name, change in calibration.items()}
     if changes.shape[1]:
         # Any rotation of independent changes is another set of them: in this one few matter.

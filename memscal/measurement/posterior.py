@@ -497,12 +497,13 @@ def _sensor_changes(
 ) -> ArrayPair:
     """Return transfer function and changes, which all profiles of one sensor share."""
     profile = apparatus.radial_profile
+    g = profile.g
     a = apparatus.conversion_constant
     u_a = apparatus.parameters.uncertainty("conversion_constant")
-    covariance = a**2 * profile.g_covariance + np.outer(profile.g, profile.g) * u_a**2
+    covariance = a**2 * profile.g_covariance + np.outer(g, g) * u_a**2
     if profile.conversion_correlation is not None:
         shared = a * u_a * profile.conversion_correlation * profile.g_errors
-        covariance = covariance + np.outer(shared, profile.g) + np.outer(profile.g, shared)
+        covariance = covariance + np.outer(shared, g) + np.outer(g, shared)
     for name in without:
         change = a * apparatus.kernel_changes[name]
         covariance = covariance - np.outer(change, change)
@@ -511,7 +512,7 @@ def _sensor_changes(
     values, vectors = np.linalg.eigh(covariance * np.outer(ring, ring))
     uncertain = values > max(_EXACT * values[-1], 0.0)
     roots = vectors[:, uncertain] * np.sqrt(values[uncertain])
-    table = np.column_stack([profile.g, roots / ring[:, None]])
+    table = np.column_stack([g, roots / ring[:, None]])
     transforms = hankel_transform(profile.r, table, np.frombuffer(nodes))
     return transforms[:, 0], transforms[:, 1:]
 

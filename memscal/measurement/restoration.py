@@ -271,13 +271,14 @@ class Restoration(Result, Checked):
 
         Of the centre only the coordinates that the scan determines: shape (4, 4) or (5, 5).
         """
-        nodes = self.posterior.nodes
-        first_drift = self.posterior.first_drift
-        rows = np.zeros((2 + first_drift + 1 - nodes, self.posterior.state.size))
+        posterior = self.posterior
+        nodes = posterior.nodes
+        first_drift = posterior.first_drift
+        rows = np.zeros((2 + first_drift + 1 - nodes, posterior.state.size))
         rows[0, :nodes] = self._at_zero
         rows[1, :nodes] = self._synthesis(0.0)
         rows[2:, nodes : first_drift + 1] = np.eye(first_drift + 1 - nodes)
-        return rows @ self.posterior.covariance @ rows.T
+        return rows @ posterior.covariance @ rows.T
 
     @property
     def _at_zero(self) -> FloatArray:

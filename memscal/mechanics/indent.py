@@ -214,22 +214,23 @@ def changes_by_inputs(contact: Contact) -> list[tuple[Contact, Contact, float]]:
 
 def _rod_contact(film: ElasticFilm, rod: Rod, target: Target, friction: float) -> Contact:
     """Return the solution in spherical Bessel functions."""
+    radius = rod.radius
     sticking = math.isinf(friction)
-    solution = solve_rod(rod.radius / film.thickness, film.poisson_ratio, sticking=sticking)
-    stiffness = 2 * film.contact_modulus * rod.radius * solution.stiffness_factor
+    solution = solve_rod(radius / film.thickness, film.poisson_ratio, sticking=sticking)
+    stiffness = 2 * film.contact_modulus * radius * solution.stiffness_factor
     load = target.value if isinstance(target, Load) else target.value * stiffness
     depth = target.value if isinstance(target, Depth) else target.value / stiffness
     if depth >= film.thickness:
         raise too_deep(film, rod, load, depth)
     terms = solution.pressure_terms.size
-    traction = solution.traction(rod.radius, load)
+    traction = solution.traction(radius, load)
     return Contact(
         film=film,
         indenter=rod,
         load=load,
         depth=depth,
-        contact_radius=rod.radius,
-        stick_radius=rod.radius if sticking else 0.0,
+        contact_radius=radius,
+        stick_radius=radius if sticking else 0.0,
         friction=friction,
         loading="",
         backend="hankel",

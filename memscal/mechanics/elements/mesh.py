@@ -149,14 +149,15 @@ class _Front:
 
     def _kept(self, moving: BoolArray, lower: FloatArray) -> BoolArray:
         """Return which nodes the next row has: never do two neighbours drop out."""
-        width = np.pad(self.r[2:] - self.r[:-2], 1)
+        r = self.r
+        width = np.pad(r[2:] - r[:-2], 1)
         slope = _SLOPE / self.sizes.refinement
-        longest = np.minimum(slope * lower, 1.001 * self.sizes.widest(self.r))
+        longest = np.minimum(slope * lower, 1.001 * self.sizes.widest(r))
         # The side that bridges a dropped node must pass well below it.
-        share = (self.r[1:-1] - self.r[:-2]) / np.maximum(width[1:-1], self.r[-1] * 1e-300)
+        share = (r[1:-1] - r[:-2]) / np.maximum(width[1:-1], r[-1] * 1e-300)
         room = np.pad((1 - share) * lower[:-2] + share * lower[2:] - self.depth[1:-1], 1)
         droppable = moving & (width > 0) & (width <= longest) & (room >= _ROOM * width)
-        kept = np.ones(self.r.size, bool)
+        kept = np.ones(r.size, bool)
         for i in np.flatnonzero(droppable):
             kept[i] = not kept[i - 1]
         return kept

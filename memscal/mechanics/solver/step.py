@@ -138,6 +138,7 @@ def _solve_system(problem: ContactProblem, status: _Status, goal: Goal) -> _Tria
     mu = problem.friction
     n = problem.heights.size
     rows = np.flatnonzero(status.pressing)
+    count = rows.size
     off_axis = c.r > 0
     stuck = np.flatnonzero(status.pressing & (status.slip == 0) & off_axis) if mu > 0 else rows[:0]
     # Shear of a slipping ring per pressure.  Nothing slips where friction has no bound.
@@ -154,7 +155,7 @@ def _solve_system(problem: ContactProblem, status: _Status, goal: Goal) -> _Tria
     matrix = np.zeros((equations.shape[0], equations.shape[0]))
     matrix[:, :-1] = equations.take(unknown, axis=1)
     matrix[:, slipping] += equations.take(n + rows[slipping], axis=1) * ratio[slipping]
-    matrix[: rows.size, -1] = matrix[-1, -1] = -unit
+    matrix[:count, -1] = matrix[-1, -1] = -unit
     right = np.concatenate([-problem.heights[rows], status.anchor[stuck], [-problem.heights[ring]]])
     if isinstance(goal, Depth):
         matrix[-1] = 0.0
@@ -163,14 +164,14 @@ def _solve_system(problem: ContactProblem, status: _Status, goal: Goal) -> _Tria
     elif isinstance(goal, Load):
         scale = unit / c.areas.sum()
         matrix[-1] = 0.0
-        matrix[-1, : rows.size] = c.areas[rows] * scale
+        matrix[-1, :count] = c.areas[rows] * scale
         right[-1] = goal.value * scale
     law = problem.interface.normal_law
     if law:
         # g = 0 becomes g = F^-1(p), linearised at the trial's separation.
         gap = status.separation[rows]
         stiffness = law.stiffness(gap, problem.film)
-        diagonal = np.arange(rows.size)
+        diagonal = np.arange(count)
         matrix[diagonal, diagonal] += 1 / stiffness
         right[diagonal] += gap + law.pressure(gap, problem.film) / stiffness
     if problem.interface.slip_length > 0 and math.isfinite(mu):
@@ -180,15 +181,15 @@ def _solve_system(problem: ContactProblem, status: _Status, goal: Goal) -> _Tria
     except np.linalg.LinAlgError as error:
         raise ConvergenceError(
             "The equations of the contact have no solution.",
-            why=f"{rows.size} rings press and {stuck.size} of them stick, on the way to {goal}.",
+            why=f"{count} rings press and {stuck.size} of them stick, on the way to {goal}.",
             cure="Check film, indenter and loads, and their units; try another number of rings.",
         ) from error
 
     pressure = np.zeros(n)
     shear = np.zeros(n)
-    pressure[rows] = solution[: rows.size]
-    shear[rows] = ratio * solution[: rows.size]
-    shear[stuck] = solution[rows.size : -1]
+    pressure[rows] = solution[:count]
+    shear[rows] = ratio * solution[:count]
+    shear[stuck] = solution[count:-1]
     depth = solution[-1] * unit
     w, u = problem.displacements(pressure, shear)
     return _Trial(pressure, shear, depth, problem.heights - depth + w, u)
