@@ -195,7 +195,7 @@ def _averaged_departures(start: ProfileEstimate, weighing: Weighing) -> _Pressur
 def _averaged_shapes(scan: Scan, start: ProfileEstimate) -> _PressureEstimate:
     """Average the shapes by their marginal likelihood; their spread counts as uncertainty."""
     weighed = weighed_shapes(pressure_shapes(scan.set_up.film), start)
-    log_marginal = np.array([weighing.log_marginal_likelihoods[0] for weighing in weighed])
+    log_marginal = np.array([weighing.evidence for weighing in weighed])
     weight = np.exp(log_marginal - log_marginal.max())
     kept = np.flatnonzero(weight >= _NEGLIGIBLE)
     fits = [_averaged_departures(start, weighed[i]) for i in kept]

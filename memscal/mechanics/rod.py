@@ -106,7 +106,7 @@ class RodTraction:
         _, m, under, scale = self._inside(r)
         # c_n = sqrt(pi) n! / Gamma(n + 1/2) gives each term the transform j_2n.
         series = _series(self.pressure_terms * _term_scale(self.pressure_terms.size), 0)
-        return np.where(under, (legendre.legval(m, series) / m) * scale, 0.0)
+        return np.where(under, legendre.legval(m, series) / m * scale, 0.0)
 
     def shear(self, r: FloatArray) -> FloatArray:
         """Return the radial traction at ``r`` (m) in Pa; zero from the edge outward."""

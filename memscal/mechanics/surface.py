@@ -75,8 +75,8 @@ class FilmField(Protocol):
 def anticlockwise(points: FloatArray, triangles: IndexArray) -> IndexArray:
     """Return quadratic triangles (m, 6) of points (n, 2) with their nodes anticlockwise."""
     first, second, third = np.moveaxis(points[triangles[:, :3]], 1, 0)
-    (x, y) = (second - first).T
-    (u, v) = (third - first).T
+    x, y = (second - first).T
+    u, v = (third - first).T
     return np.where((x * v < u * y)[:, None], triangles[:, [0, 2, 1, 5, 4, 3]], triangles)
 
 

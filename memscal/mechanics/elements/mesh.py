@@ -179,6 +179,6 @@ class _Front:
             self.triangles.extend(triangle for triangle in corners if len(set(triangle)) == 3)
 
     def _length(self, start: int, end: int) -> float:
-        (r1, d1) = self.points[start]
-        (r2, d2) = self.points[end]
+        r1, d1 = self.points[start]
+        r2, d2 = self.points[end]
         return float(np.hypot(r1 - r2, d1 - d2))
