@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from functools import lru_cache
 
@@ -90,7 +91,7 @@ class LineFields:
     ) -> LineFields:
         """Lift the profile of the voltages, by its transform, and the reference."""
         spacing = choice.spacing
-        cells = scipy.fft.next_fast_len(int(np.ceil(choice.extent / spacing)), real=True)
+        cells = scipy.fft.next_fast_len(math.ceil(choice.extent / spacing), real=True)
         grid = EvenGrid(cells + 1, spacing)
         reference = estimate.model.reference
         if reference.source:
@@ -243,8 +244,8 @@ class RasterFields:
         """Return a kernel on its support."""
         step = self.grid.x[1] - self.grid.x[0]
         # Odd, so that the kernel's zero stays a point of the lattice.
-        least = int(np.ceil(step / (2.0 * self.step))) | 1
-        finer = int(np.ceil(step / (2.0 / 3 * self.step))) | 1
+        least = math.ceil(step / (2.0 * self.step)) | 1
+        finer = math.ceil(step / (2.0 / 3 * self.step)) | 1
         refinement = max(min(5, finer), least)
         fine, values = self.grid.refined(kernel, refinement)
         if profile:
@@ -269,8 +270,8 @@ Fields = LineFields | RasterFields
 
 def _continued(axis: EvenAxis, reach: float, extent: float) -> tuple[FloatArray, IndexArray]:
     """Continue a raster's axis on both sides, to an odd number of nodes; index the points."""
-    steps = int(np.rint(reach / axis.step))
-    padding = int(np.ceil(max(2 * extent - reach, 0.0) / (2 * axis.step))) + 1
+    steps = round(reach / axis.step)
+    padding = math.ceil(max(2 * extent - reach, 0.0) / (2 * axis.step)) + 1
     count = steps + 1 + 2 * padding + steps % 2
     nodes = axis.start + axis.step * (np.arange(count) - padding)
     return np.asarray(nodes, np.float64), axis.index + padding

@@ -19,6 +19,7 @@ the sensor to the indenter,
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import field
 from functools import cached_property, lru_cache
@@ -92,7 +93,7 @@ def wave_table(wave: int, across: bool, reach: float, nodes: bytes) -> WaveTable
     from scipy.interpolate import make_interp_spline
 
     k = np.frombuffer(nodes)
-    count = int(np.ceil(reach * k[-1] / _TABLE_PHASE)) + 1
+    count = math.ceil(reach * k[-1] / _TABLE_PHASE) + 1
     radii = reach / count * np.arange(-_DEGREE, count + _DEGREE + 1.0)
     lower = range(wave - 2, wave) if wave > 1 else ()
     below = [wave_table(order, across, reach, nodes).values for order in lower]
@@ -279,7 +280,7 @@ class ForwardModel:
         strongest = np.abs(self._measures).max(axis=0)
         reach = _REACHES * geometry.radius.max() / geometry.reach
         table = (points.order, geometry.across, geometry.reach, self.k.tobytes())
-        size, right, splines = _seen_waves(*table, int(np.ceil(reach)), strongest.tobytes())
+        size, right, splines = _seen_waves(*table, math.ceil(reach), strongest.tobytes())
         interpolation = geometry.interpolation(self.k.size)
         factor = points.load
         if points.order:

@@ -155,7 +155,7 @@ def residuals_of(estimate: ProfileEstimate, model: FreeModel | None = None) -> R
     point = model.point[order]
     basis = model.basis[order]
     values = model.left_over[order]
-    degrees = basis.shape[0] - basis.shape[1]
+    degrees = len(basis) - basis.shape[1]
     stated = points.noise_stated
     return Residuals(values, basis, point, place[point], sequence[point], stated, degrees)
 

@@ -117,7 +117,7 @@ def dry_against_lubricated(
 
 def _averaged(points: LoadPoints) -> LoadPoints:
     """Return the mean of the repeats at each position, sorted by position."""
-    rounded = np.round(points.offset, 12)
+    rounded = points.offset.round(12)
     order = np.argsort(rounded, kind="stable")
     places, starts, counts = np.unique(rounded[order], return_index=True, return_counts=True)
 

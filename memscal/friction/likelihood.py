@@ -141,7 +141,7 @@ def load_points(profile: MeasuredProfile, channel: str = "zz") -> LoadPoints:
     drift = (position - middle) / (np.ptp(position) / 2)
     places = None
     if points.x_errors.any() and not profile.scan.position_errors_by_repeat:
-        places = _own(np.round(position, 12).tolist())
+        places = _own(position.round(12).tolist())
     return LoadPoints(
         u=points.u,
         offset=position - profile.centre[profile.axis],
@@ -364,7 +364,7 @@ def stacked(normal: Readings, shear: Readings) -> Readings:
         correlations.append(own)
         # A contact is known by its place, and by which of those there it is.
         count: Counter[float] = Counter()
-        for place in np.round(channel.offset, 12).tolist():
+        for place in channel.offset.round(12).tolist():
             contacts.append((place, count[place]))
             count[place] += 1
     names = ("u", "offset", "log_load", "noise", "load_errors", "x_errors")
@@ -376,7 +376,7 @@ def stacked(normal: Readings, shear: Readings) -> Readings:
         contacts=_own(contacts),
     )
     if points[0].places is not None:
-        together = replace(together, places=_own(np.round(together.offset, 12).tolist()))
+        together = replace(together, places=_own(together.offset.round(12).tolist()))
     columns = [dict(channel.columns) for channel in predicted]
     if "apparatus" in columns[1]:
         columns[1]["apparatus_shear"] = columns[1].pop("apparatus")

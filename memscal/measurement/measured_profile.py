@@ -277,7 +277,7 @@ def _with_noise(scan: Scan, electronic: FloatArray, load_noise: FloatArray) -> S
     correlation = scan.u_zz_correlation
     if correlation is not None:
         # The scatter of the loads is independent: it takes its share from the correlation.
-        shape = (-1, correlation.shape[0])
+        shape = (-1, len(correlation))
         electronic_variance = np.nanmean(electronic.reshape(shape) ** 2, axis=0)
         variance = np.nanmean(total.reshape(shape) ** 2, axis=0)
         correlation = _scaled(correlation, np.sqrt(electronic_variance / variance))

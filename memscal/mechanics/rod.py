@@ -241,7 +241,7 @@ def _solve(ratio: float, nu: float, sticking: bool, terms: int, order: int) -> R
         coupling = half_space_coupling(nu) * products
         coupling += (even * (weights * by_coupling)) @ odd.T
         matrix = np.block([[matrix, coupling], [coupling.T, radial]])
-    solution = np.linalg.solve(matrix, np.eye(1, matrix.shape[0])[0])
+    solution = np.linalg.solve(matrix, np.eye(1, len(matrix))[0])
     scaled = solution / solution[0]
     scaled.setflags(write=False)
     return RodSolution(float(np.pi / 2 * solution[0]), scaled[:terms], scaled[terms:], np.nan)

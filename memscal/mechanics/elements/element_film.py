@@ -219,7 +219,7 @@ def field_mesh(system: MixedSystem, solution: FloatArray, film: ElasticFilm) -> 
     index = index.reshape(inward.shape)
     # The displacement's gradient and the mean pressure at the nodes of every triangle.
     basis = system.displacement
-    rule = (local.T, np.ones(local.shape[0]))
+    rule = (local.T, np.ones(len(local)))
     at_nodes = skfem.Basis(basis.mesh, basis.elem, quadrature=rule)
     moved, pressed = np.split(solution, [basis.N])
     gradient = at_nodes.interpolate(moved).grad
@@ -306,7 +306,7 @@ class ElementFilm:
     @property
     def discretisation(self) -> str:
         """What was discretised and how finely, in words."""
-        triangles = self.system.mesh.triangles.shape[0]
+        triangles = len(self.system.mesh.triangles)
         return (
             f"finite elements, quartic displacement and cubic pressure (Taylor-Hood): {triangles} "
             f"triangles, {self.system.free.size} unknowns, free edge at {self.radius * 1e3:g} mm"

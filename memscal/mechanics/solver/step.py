@@ -152,7 +152,7 @@ def _solve_system(problem: ContactProblem, status: _Status, goal: Goal) -> _Tria
     ring = goal.ring if isinstance(goal, Touch) else 0
     unknown = np.append(rows, n + stuck)
     equations = c.whole.take(np.append(unknown, ring), axis=0)
-    matrix = np.zeros((equations.shape[0], equations.shape[0]))
+    matrix = np.zeros((len(equations), len(equations)))
     matrix[:, :-1] = equations.take(unknown, axis=1)
     matrix[:, slipping] += equations.take(n + rows[slipping], axis=1) * ratio[slipping]
     matrix[:count, -1] = matrix[-1, -1] = -unit
