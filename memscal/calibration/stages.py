@@ -84,11 +84,12 @@ def solved(
     stresses: Sequence[BaseStress],
     estimate: ProfileEstimate,
     method: Method,
+    of_grid: ProfileEstimate | None = None,
 ) -> Solution:
-    """Find A and G from the estimate of the profile; see :func:`solve`."""
+    """Find A and G from the estimate of the profile, or with the grid of another's width."""
     smoothed = None if estimate.points.order else smooth_profile(estimate)
     band = find_band(estimate, smoothed)
-    choice = choose_grid(estimate, band)
+    choice = choose_grid(of_grid or estimate, band)
     fields = prepare_fields(estimate, smoothed, choice, divided=not isinstance(method, Bayesian))
     band = beyond_zeros(band, estimate, fields.grid.wavenumber, fields.voltage.transform)
     gaussian = _misfit(estimate, estimate.gaussian.predicted)
