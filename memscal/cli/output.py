@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 import click
 
-from memscal.errors import OutputError, counted
+from memscal.errors import OutputError
 from memscal.figures import FIGURE_SUFFIXES
 from memscal.formats.files import HDF5_SUFFIXES, atomic_write_bytes, ensure_writable, together
 from memscal.model.checks import NOISE_ALONE, Message
@@ -104,13 +104,14 @@ def show_messages(messages: Iterable[Message], owners: str = "") -> None:
     """Write messages to standard error, those that say the same once; of how many owners, too."""
     alike: dict[tuple[str, str, str], list[str]] = {}
     # What the answer says is not said again.
-    for item in (item for item in messages if item.kind != NOISE_ALONE):
-        key = item.kind, item.severity, _PARTICULARS.sub("", item.text)
-        alike.setdefault(key, []).append(item.text)
+    for item in messages:
+        if item.kind != NOISE_ALONE:
+            key = item.kind, item.severity, _PARTICULARS.sub("", item.text)
+            alike.setdefault(key, []).append(item.text)
     for (_, severity, _), (text, *others) in alike.items():
         more = f" ({len(others)} more like it; --json lists all.)" if others else ""
         if owners:
-            more = f" ({counted(1 + len(others), owners)})"
+            more = f" ({owners}: {len(others) + 1})"
         (warn if severity == "warning" else note)(text + more)
 
 

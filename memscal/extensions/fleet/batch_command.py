@@ -106,7 +106,7 @@ def command(
     words, reading = recipe_of(recipe) if recipe else ({}, None)
     words |= settings | {"artifacts": artifacts}
     batch = Batch(paths, results, chosen, artifacts, words, reading, force, shard_size)
-    if report is not None and results.resolve() not in report.resolve().parents:
+    if report is not None and results not in report.parents:
         scans = (batch.folder / scan.path for scan in batch.scans())
         out.prove_writable([report], force=force, inputs=[*paths, *scans])
     batch = batch.prepare(resume=resume)
@@ -124,10 +124,10 @@ def command(
         if shard_paths(results):
             out.note("The shards that are done stay: --resume does the rest.")
         raise
+    seconds = monotonic() - start
     done = sum(outcomes, Counter())
     errors = done["errors"]
     failed = done["failed"]
-    seconds = monotonic() - start
     counts = {
         "scans": total,
         "passed": total - errors - failed,

@@ -101,7 +101,7 @@ def test_tables_are_imported_each_by_itself_and_named_by_their_files(run, tables
     run(*line, *named, "--resume").exits(3, "options: thickness: 2.03, now 1.9.")
     run(*line, *named[2:], "--resume", "--name-pattern", "die_{rw}_{col}").exits(2, "mean {row}?")
     assert Path("scans/die_0_7.h5").stat().st_mtime_ns == before
-    run(*line, *named[:2], "--resume", "--force").exits(0, "law neo-hookean. (3 tables)")
+    run(*line, *named[:2], "--resume", "--force").exits(0, "law neo-hookean. (tables: 3)")
     assert set(pd.read_csv("scans/manifest.csv")["place_unit"]) == {"die"}
     other = run(*line, "--name-pattern", "chip_{row}", "--force", "--json").exits(1).json
     assert other["problems"][0]["problem"] == "die_0_7.csv is not named as chip_{row}."
