@@ -49,7 +49,7 @@ def assemble(
     reference = stress_table(solution.stress)
     channel = solution.estimate.points.channel
     other_estimate = None
-    if other is not None and solution.other is not None:
+    if other and solution.other:
         method = "white-noise" if isinstance(solution.method, Bayesian) else "bayesian"
         radial = _radial(solution, solution.other, other)
         other_estimate = OtherEstimate(method, other.parameters.only(_BY_ROUTE), radial)
@@ -102,11 +102,12 @@ def _configuration(
         options = asdict(method)
     unit = prepared.reading.per
     centre: Values | None = None
-    if request.centre is not None or solution.apart is not None:
+    if request.centre or solution.apart:
         choice = PER_REPEAT if solution.per_repeat else COMMON
         centre = {"choice": choice, "chosen_by": "option" if request.centre else "test"}
-        if solution.apart is not None:
+        if solution.apart:
             centre["p_value"] = solution.apart.p_value
+    u_load = solution.scans[0].load_uncertainty
     # A scan that was split by repeats or loads has one source.
     sources = {i: scan.source for i, scan in zip(solution.owners, solution.scans, strict=True)}
     further = [
@@ -119,6 +120,7 @@ def _configuration(
         "seed": request.seed,
         "options": options,
         "reference_unit": None if unit == "Pa" else unit,
+        "relative_load_uncertainty": u_load and u_load / solution.scans[0].stated_load,
         "free": prepared.thickness and prepared.thickness.record,
         "film_laws": laws and laws.record,
         "explanations": explanations or None,
@@ -153,8 +155,8 @@ def _radial(solution: Solution, deconvolution: Deconvolution, results: Results) 
     g = deconvolution.g
     gaussian = unit_gaussian(g.r, solution.estimate.gaussian.sigma)
     errors = np.sqrt(np.diag(results.radial_covariance))
-    with_a = results.cross_covariance[:, results.parameters.names.index("conversion_constant")]
     scale = errors * results.parameters.uncertainty("conversion_constant")
+    with_a = results.with_constant
     correlation = np.divide(with_a, scale, out=np.zeros_like(with_a), where=scale > 0)
     return ApparatusRadial(g.r, g.radial, errors, gaussian, results.radial_covariance, correlation)
 
@@ -164,9 +166,9 @@ def _reconvolution(solution: Solution) -> Reconvolution:
     points = estimate.points
     if solution.per_repeat and not points.planar and max(solution.owners) == 0:
         # Repeats of one line are shown with their centres at that of the first.
-        axis = int(np.argmax(points.free[0]))
+        axis = np.argmax(points.free[0])
         place = estimate.offset[axis] + estimate.centre[axis]
-    elif points.scans > 1 and estimate.points.order:
+    elif points.scans > 1 and points.order:
         # The sign of a shear depends on the side.
         place = estimate.offset[estimate.model.axis]
     elif points.scans > 1 or points.planar:

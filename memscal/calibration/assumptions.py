@@ -109,7 +109,7 @@ def with_slow_noise(solution: Solution) -> Solution:
     """Count what correlation the noise may have, where a scan states no noise."""
     estimate = solution.estimate
     rounding = estimate.noise_scale > estimate.weighed.noise
-    if rounding or estimate.points.u_errors is not None:
+    if rounding or estimate.points.noise_stated:
         return solution
     slow = slow_noise(estimate, residuals_of(estimate))
     return replace(solution, estimate=replace(estimate, slow=slow))
@@ -134,7 +134,7 @@ def _sizes(effect: Influence, results: Results) -> dict[str, float]:
     """Sizes of an influence, of the sign that needs less, that move each parameter by its u."""
     parameters = results.parameters
     squared = np.broadcast_to(effect.squared, effect.voltage.shape)
-    moved = np.abs(results.by_voltage @ np.stack([effect.voltage, squared], axis=1))
+    moved = abs(results.by_voltage @ np.column_stack([effect.voltage, squared]))
     sizes = {}
     for parameter in MOVED:
         row = parameters.names.index(parameter)

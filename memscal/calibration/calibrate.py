@@ -309,13 +309,12 @@ def _propagated(
     if isinstance(solution.fields, RasterFields):
         from memscal.calibration.field_uncertainty import field_errors
 
-        plane = field_errors(solution, solution.deconvolution, *inputs[:2])
+        plane = field_errors(solution, *inputs[:2])
         results = replace(results, field_errors=plane)
     # Some checks are of the division, whichever the method.
-    needed = other or results.division is None
-    if not needed or solution.other is None:
-        return results, None
-    return results, uncertainties(solution, solution.other, *inputs)
+    if (other or not results.division) and solution.other:
+        return results, uncertainties(solution, solution.other, *inputs)
+    return results, None
 
 
 def _require_distinct(results: Results, solution: Solution) -> None:
@@ -342,7 +341,7 @@ def _effects(solution: Solution, alternatives: Sequence[BaseStress | None] | Non
     estimate = solution.estimate
     stresses = []
     spectra = None
-    if alternatives is not None:
+    if alternatives:
         pairs = zip(solution.owners, solution.stresses, strict=True)
         stresses = [alternatives[i] or stress for i, stress in pairs]
         points = [estimate.points.only(i) for i in range(len(scans))]

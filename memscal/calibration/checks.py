@@ -50,7 +50,7 @@ _Checks = Iterator[QualityCheck]
 
 #: The Bayes factor of a Gaussian sensor has mean one, and exceeds a thousand at most once in a
 #: thousand (Markov's inequality).
-_LOG_BAYES_LIMIT = -float(np.log(FALSE_ALARM))
+_LOG_BAYES_LIMIT = -math.log(FALSE_ALARM)
 _EDGE = "an edge: a flat top with steep flanks, as of a disc"
 _KINDS = {
     **dict.fromkeys(("edge", "rough edge", "disc"), _EDGE),
@@ -64,7 +64,7 @@ _KINDS = {
 #: tails at 0.1, 0.5 and 2 % noise, both of unstated noise (tests/accuracy/test_division.py).
 _ROUTES_LIMIT = 3.2
 #: Full width of a Gaussian at half of its maximum, over its standard deviation.
-_HALF_WIDTH = float(np.sqrt(8 * np.log(2)))
+_HALF_WIDTH = math.sqrt(8 * math.log(2))
 #: At this share of the thickness the base stress of a neo-Hookean film differs by a tenth.
 _DEEP = 0.1
 #: Of 1000 curvatures as their prior has them one is beyond; the noise hides less of it than all.
@@ -113,17 +113,18 @@ def _reconvolutions(solution: Solution) -> _Checks:
         else "the regularisation has removed something that the scan shows (see method bayesian)"
     )
     fitted = solution.gaussian_misfit
+    degrees = fitted.degrees
     p_value = None
-    if solution.estimate.points.u_errors is not None:
-        p_value = float(chdtrc(fitted.degrees, fitted.chi2_reduced * fitted.degrees))
+    if solution.estimate.points.noise_stated:
+        p_value = float(chdtrc(degrees, fitted.chi2_reduced * degrees))
     # Both are of the same points; the noise is stated, or is known by degrees of its own.
-    limit = chi_square_limit(fitted.degrees)
+    limit = chi_square_limit(degrees)
     noise = solution.estimate.raster_noise
-    if noise is not None:
+    if noise:
         # What the noise was estimated from is a part of the misfit: the rest of it is independent.
-        rest = max(fitted.degrees - noise.degrees, 1.0)
+        rest = max(degrees - noise.degrees, 1.0)
         limit = noise.degrees + rest * float(fdtri(rest, noise.degrees, 1 - FALSE_ALARM))
-    limit /= fitted.degrees
+    limit /= degrees
     yield check(
         "reconvolution",
         solution.deconvolution.misfit.chi2_reduced,
@@ -204,9 +205,9 @@ def _shape(solution: Solution, parameters: ParameterSet) -> _Checks:
     ratios = [parameters["fwhm"] / (_HALF_WIDTH * parameters[name]) for name in _WIDTHS]
     widest = max(max(ratio, 1 / ratio) for ratio in ratios)
     share = ring_areas(g.r) * g.radial
-    negative = np.maximum(-share, 0.0).sum() / np.abs(share).sum()
+    negative = np.maximum(-share, 0.0).sum() / abs(share).sum()
     k, transfer = solution.fields.grid.axis_transfer(deconvolution.quotient.values)
-    power = k * np.abs(transfer / deconvolution.conversion_constant) ** 2
+    power = k * abs(transfer / deconvolution.conversion_constant) ** 2
     end = max(solution.band.resolved, solution.band.relevant, 2 / solution.estimate.gaussian.sigma)
     rough = power[k > _BEYOND * end].sum() / power.sum()
     cure = "take method white-noise or bayesian, or more regularisation"
@@ -275,7 +276,7 @@ def _set_up(solution: Solution) -> _Checks:
     film = solution.scan.film
     sigma = estimate.gaussian.sigma
     source = solution.stress.form is not None
-    if film is not None and not source:
+    if film and not source:
         yield check(
             "width_over_thickness",
             sigma / film.thickness,
@@ -317,10 +318,10 @@ def _set_up(solution: Solution) -> _Checks:
 
 def _baseline(estimate: ProfileEstimate) -> _Checks:
     points = estimate.points
-    last = 1 + int(points.free[0].sum())
+    last = 1 + points.free[0].sum()
     yield check(
         "baseline_drift",
-        2 * np.abs(estimate.drifts[1:last]).max() / estimate.largest_signal,
+        2 * abs(estimate.drifts[1:last]).max() / estimate.largest_signal,
         0.05,
         "Change of the baseline across the scan over the largest signal. It is fitted and removed "
         "as a line that is straight or a little curved; a failure means that what is left of it "
@@ -331,7 +332,7 @@ def _baseline(estimate: ProfileEstimate) -> _Checks:
         prior = points.curvature[points.curved] ** 2
         # What a mean has of the prior's variance the posterior has not.
         found = prior - np.diag(estimate.weighed.covariance)[points.curvatures]
-        share = np.abs(estimate.drifts[-count:]) / np.sqrt(np.maximum(found, _LEAST_FOUND * prior))
+        share = abs(estimate.drifts[-count:]) / np.sqrt(np.maximum(found, _LEAST_FOUND * prior))
         yield check(
             "baseline_curvature",
             share.max(),
@@ -346,7 +347,7 @@ def _baseline(estimate: ProfileEstimate) -> _Checks:
 def _indentation(solution: Solution, results: Results, assumed: Sequence[Assumption]) -> _Checks:
     """Compare what a film's law would change, where nothing is counted for it, with u."""
     film = solution.scan.film
-    if film is None or film.law not in ("", LINEAR) or "model_form" in results.changes:
+    if not film or film.law not in ("", LINEAR) or "model_form" in results.changes:
         return
     laws = [assumption.sizes for assumption in assumed if assumption.name == "film_law"]
     if laws:
@@ -387,7 +388,7 @@ def _unexplained(estimate: ProfileEstimate, results: Results) -> _Checks:
         outcome = pure_error_test(estimate, model)
         compared = "with the scatter of repeats, as no noise is stated: an F ratio"
         noise = ""
-    if outcome is not None:
+    if outcome:
         yield _tested(
             "chi_square",
             outcome,
@@ -430,7 +431,7 @@ def _bayes_factor(estimate: ProfileEstimate) -> QualityCheck:
     kinds: dict[str, float] = {}
     for hypothesis, departure in zip(HYPOTHESES[1:], weighed.probability[1:], strict=True):
         if hypothesis.estimate > 0:
-            kinds[hypothesis.kind] = kinds.get(hypothesis.kind, 0.0) + float(departure)
+            kinds[hypothesis.kind] = kinds.get(hypothesis.kind, 0.0) + departure
     if estimate.free:
         departed = weighed.free
         kinds = {"plane": 1.0}
@@ -480,7 +481,7 @@ def _steadiness(solution: Solution) -> _Checks:
     """Test whether A, centre and baseline are the same at all loads, branches and repeats."""
     estimate = solution.estimate
     linear = model_tests.linearity_test(estimate)
-    if linear is not None:
+    if linear:
         yield added_check(
             "load_linearity",
             linear.fall,
@@ -492,7 +493,7 @@ def _steadiness(solution: Solution) -> _Checks:
     yield from _hysteresis(estimate)
     yield from _runs(estimate)
     apart = solution.apart
-    if apart is not None and not solution.per_repeat:
+    if apart and not solution.per_repeat:
         yield _tested(
             "repeat_centres",
             apart,
@@ -506,7 +507,7 @@ def _steadiness(solution: Solution) -> _Checks:
 def _hysteresis(estimate: ProfileEstimate) -> _Checks:
     """Compare approach with retreat where scans say which is which."""
     branches = hysteresis_test(estimate)
-    if branches is None:
+    if not branches:
         return
     reading = estimate.points.reading
     units = (
@@ -534,7 +535,7 @@ def _hysteresis(estimate: ProfileEstimate) -> _Checks:
 def _runs(estimate: ProfileEstimate) -> _Checks:
     """Compare the offset and the noise of each repeat and scan with those of the others."""
     runs = compare_runs(estimate)
-    if runs is None:
+    if not runs:
         return
     reading = estimate.points.reading
     largest = estimate.largest_signal
@@ -550,7 +551,7 @@ def _runs(estimate: ProfileEstimate) -> _Checks:
         "repeats by --centre per-repeat) takes that up, but not what else moved.",
         runs.offset.p_value,
     )
-    stated = "" if estimate.points.u_errors is None else ", each over what is stated"
+    stated = ", each over what is stated" if estimate.points.noise_stated else ""
     yield check(
         "noise_agreement",
         runs.noise.value**0.5,
@@ -585,11 +586,11 @@ def _held_out(estimate: ProfileEstimate) -> _Checks:
         "scan": "the scans are not of the same sensor, film and reference; calibrate each by "
         "itself and compare",
     }
-    stated = estimate.points.u_errors is not None
+    stated = estimate.points.noise_stated
     scale = "" if stated else ", over the others' own scatter as no noise is stated"
     for what in reversed(held_out.values()):
         worst = model_tests.hold_out(estimate, groups[what])
-        if worst is None:
+        if not worst:
             continue
         joined = "" if worst.alone else f", {what}s taken several at a time"
         yield _tested(

@@ -79,7 +79,7 @@ def _clipped(scan: Scan) -> str:
     top = clipped_looks(scan.u_zz[np.isfinite(scan.u_zz)])
     if top.size:
         lowest = top[-1] - np.ptp(top) - _BELOW * abs(top[-1])
-        ceiling = scan.reading.text(float(lowest), ".6g")
+        ceiling = scan.reading.text(lowest, ".6g")
         return (
             f"{top.size} readings look clipped: they agree at {scan.reading.text(top[0], '.4g')}. "
             "If amplifier or converter was at its end there, leave them out (memscal import "
@@ -102,7 +102,7 @@ def diagnosed(
         some.append(measured.selected(np.arange(0, measured.u.size, step)))
     search = _Search(tuple(scans), tuple(stresses), tuple(some))
     error = search.error()
-    if error is not None:
+    if error:
         return error
     if isinstance(outcome, ProfileEstimate):
         return _hidden(outcome, search)
@@ -162,11 +162,11 @@ class _Trial:
     def loss(self, noise: float) -> float:
         """Chi-square of the residuals, linear beyond the knee."""
         root = np.sqrt(1 + (self.residual / (noise * _KNEE)) ** 2)
-        return float(np.sum(2 * _KNEE**2 * (root - 1)))
+        return np.sum(2 * _KNEE**2 * (root - 1))
 
     def explains(self, noise: float) -> bool:
         """Whether a sensor of some width fits, with a signal."""
-        if self.fit is None or not self.fit.has_width(self.weights, noise):
+        if not self.fit or not self.fit.has_width(self.weights, noise):
             return False
         variance = self.fit.covariance(self.weights, noise)[0, 0]
         return self.fit.conversion_constant > LEAST_SIGNIFICANCE * float(np.sqrt(variance))
@@ -212,7 +212,7 @@ class _Search:
         stretch = _grid(_LONGEST_SPAN * h / span)
         positions = _Length("positions", "/entry/data/x", 1.0, stretch)
         ideal = getattr(self.stresses[0], "ideal", None)
-        if ideal is not None:
+        if ideal:
             words = f"a {IDEAL[ideal.shape]} of the {ideal.shape}"
             return _Length(words, "--reference", ideal.size, 1 / stretch), positions
         if not all(isinstance(s, Contact) and isinstance(s.indenter, Rod) for s in self.stresses):
@@ -229,19 +229,19 @@ class _Search:
     def error(self) -> FitError | None:
         """Return the error that names the lengths at fault; ``None`` if none is."""
         trials = {length: self._coarse(length) for length in self.lengths}
-        fitted = [trial for trial in chain(*trials.values()) if trial.fit is not None]
+        fitted = [trial for trial in chain(*trials.values()) if trial.fit]
         if not fitted:
             return None
         # Where no noise is stated, it is that of the best fit.
         noise = 1.0
-        if self.points[0].u_errors is None:
+        if not self.points[0].noise_stated:
             noise = min(robust_scale(trial.residual, TINY) for trial in fitted)
         best = {length: self._refined(length, tried, noise) for length, tried in trials.items()}
         least = min(trial.loss(noise) for trial in best.values())
         unscaled = trials[self.lengths[0]][0].loss(noise)
         per_degree = max(1.0, least / fitted[0].residual.size)
         most = min(unscaled - _CLEARLY * per_degree, 2 * least + _CLEARLY)
-        wider = noise * float(np.sqrt(per_degree))
+        wider = noise * np.sqrt(per_degree)
         causes = []
         others = []
         for length, trial in best.items():
@@ -266,7 +266,7 @@ class _Search:
         """Try the factors of a length until the misfit has risen twice."""
         trials = []
         for factor in length.factors:
-            trials.append(self._trial(length, float(factor)))
+            trials.append(self._trial(length, factor))
             losses = [trial.loss(1.0) for trial in trials]
             if len(losses) > 2 and min(losses[-2:]) > _RISEN * min(losses):
                 break
@@ -281,7 +281,7 @@ class _Search:
             return tried[0]
 
         def loss(exponent: float) -> float:
-            tried.append(self._trial(length, float(np.exp(exponent))))
+            tried.append(self._trial(length, np.exp(exponent)))
             return min(tried[-1].loss(noise), 1e300)
 
         middle = np.log(tried[0].factor)
@@ -298,7 +298,7 @@ class _Search:
         near = 1.0
         far = best.factor
         for _ in range(_HALVINGS):
-            middle = float(np.sqrt(near * far))
+            middle = np.sqrt(near * far)
             fits = self._trial(length, middle).loss(noise) <= enough
             near, far = (near, middle) if fits else (middle, far)
         return length.scaled(far, "at most " if far < 1 else "at least ")
@@ -333,10 +333,10 @@ def _scaled(stress: BaseStress, path: str, factor: float) -> BaseStress:
         return press_rod(replace(film, law=LINEAR, mooney_rivlin_ratio=None), rod, _LOAD)
     profile = stress_table(stress)
     ideal = profile.ideal
-    if ideal is not None:
+    if ideal:
         return replace(profile, ideal=replace(ideal, size=ideal.size * factor))
     field = profile.field
-    if field is not None:
+    if field:
         return replace(profile, field=replace(field, x=field.x * factor, y=field.y * factor))
     shear = None if profile.sigma_rz is None else profile.sigma_rz / factor**2
     zz = profile.sigma_zz / factor**2

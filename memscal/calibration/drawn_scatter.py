@@ -12,15 +12,12 @@ from typing import Any
 
 import numpy as np
 
-from memscal.calibration.fields import choose_grid
-from memscal.calibration.stages import Solution, deconvolve, prepare_fields
+from memscal.calibration.stages import Solution, solved
 from memscal.calibration.uncertainty import DrawnScatter, read_off
 from memscal.deconvolution.division import Method, Tikhonov, WhiteNoise, WhiteNoiseDraw, Wiener
 from memscal.errors import FitError
-from memscal.estimation.band import beyond_zeros, find_band
 from memscal.estimation.bayesian import Bayesian
 from memscal.estimation.profile import ProfileEstimate
-from memscal.estimation.smoothing import smooth_profile
 from memscal.model.arrays import FloatArray
 
 #: Draws: their standard deviation is known to 1/sqrt(2 n), 10 % for 50.  Restorations of large
@@ -43,8 +40,8 @@ def drawn_scatter(solution: Solution) -> DrawnScatter | None:
     failure = ""
     method: Any = solution.method
     seeded = is_dataclass(method) and hasattr(method, "seed")
-    weighed = solution.estimate.weighed
     estimate = solution.estimate
+    weighed = estimate.weighed
     model = estimate.model
     predicted = estimate.predicted
     for _ in range(count):
@@ -95,16 +92,13 @@ def _divided(
     solution: Solution, estimate: ProfileEstimate, error: FloatArray, method: Method
 ) -> tuple[dict[str, float], FloatArray, FloatArray]:
     """Divide a draw: A and the numbers read off G, G at the solution's radii, and its transfer."""
-    smoothed = smooth_profile(estimate)
-    band = find_band(estimate, smoothed)
     # The width of the Gaussian chooses the grid.
     gain = solution.estimate.gaussian.gain(solution.estimate.weights)
-    sigma = estimate.gaussian.sigma + float((gain[1:2] @ error)[0])
+    sigma = estimate.gaussian.sigma + (gain[1:2] @ error)[0]
     wider = replace(estimate, gaussian=replace(estimate.gaussian, sigma=sigma))
-    fields = prepare_fields(estimate, smoothed, choose_grid(wider, band))
-    band = beyond_zeros(band, estimate, fields.grid.wavenumber, fields.voltage.transform)
-    drawn = deconvolve(estimate, band, fields, method)
-    k, spectrum = fields.grid.axis_transfer(drawn.quotient.values)
+    again = solved(solution.scans, solution.stresses, estimate, method, wider)
+    drawn = again.deconvolution
+    k, spectrum = again.fields.grid.axis_transfer(drawn.quotient.values)
     wavenumbers = solution.fields.grid.wavenumber_axis
-    transfer = np.interp(wavenumbers, k, np.abs(spectrum) / drawn.conversion_constant, right=0.0)
+    transfer = np.interp(wavenumbers, k, abs(spectrum) / drawn.conversion_constant, right=0.0)
     return *read_off(drawn, solution.deconvolution.g.r), transfer

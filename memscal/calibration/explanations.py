@@ -119,7 +119,7 @@ def explanation(rows: Sequence[Mapping[str, Any]]) -> str:
 
 def _weighed(solution: Solution, departure: float) -> list[Values]:
     """Weigh each rival beside a G that is not Gaussian, by falling evidence."""
-    gaussian = float(solution.estimate.weighed.log_marginals[0])
+    gaussian = solution.estimate.weighed.log_marginals[0]
     found = [(departure, DEPARTURE, _BY_G, 0.0)]
     for name in _applicable(solution):
         value, u, evidence, a = _fitted(solution, name)
@@ -175,8 +175,8 @@ def _fitted(solution: Solution, name: str) -> tuple[float, float, float, float]:
     best = minimize_scalar(loss, bounds=(-_FARTHEST, _FARTHEST), options={"xatol": _STEP / 5})
     bend = (loss(best.x + _STEP) + loss(best.x - _STEP) - 2 * best.fun) / _STEP**2
     width = max(bend, _FARTHEST**-2) ** -0.5
-    size = unit * float(best.x)
-    evidence = math.log(math.sqrt(2 * math.pi) * width) - float(best.fun)
+    size = unit * best.x
+    evidence = math.log(math.sqrt(2 * math.pi) * width) - best.fun
     value = min(stated + size, 0.5) if name == "poisson_ratio" else stated + size
     return value, width * unit, evidence, fitted(size).conversion_constant
 
@@ -208,7 +208,7 @@ def _changed(solution: Solution, name: str, size: float, fit: GaussianFit) -> Fo
     elif name == "baseline_curvature":
         added = size * solution.estimate.largest_signal * model.parabola
     elif name == "gain_curvature":
-        added = -size * signal * np.abs(signal) / np.abs(signal).max()
+        added = -size * signal * abs(signal) / abs(signal).max()
     else:
         # The reading is a mean over where the indenter was; what it lags on average is no error.
         kernel = fit.conversion_constant * gaussian_transfer(model.k, fit.sigma)

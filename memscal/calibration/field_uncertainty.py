@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from scipy.fft import fftfreq, fftshift, ifftshift, irfft2, rfft2, rfftfreq
 
 from memscal.calibration.fields import cosine_taper
-from memscal.calibration.stages import Deconvolution, Solution
+from memscal.calibration.stages import Solution
 from memscal.calibration.uncertainty import Correlations, Effects, correlation_matrix
 from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.voltage_map import BLOCK, square_root
@@ -53,17 +53,13 @@ _PER_NODE = 3
 _COLUMNS = 16
 
 
-def field_errors(
-    solution: Solution,
-    deconvolution: Deconvolution,
-    effects: Effects,
-    correlations: Correlations,
-) -> FloatArray:
+def field_errors(solution: Solution, effects: Effects, correlations: Correlations) -> FloatArray:
     """Standard uncertainty of G on its grid (2, m, n), in 1/m^2: of noise alone, and in all."""
     from scipy.interpolate import RectBivariateSpline
 
     fields: Any = solution.fields
     estimate = solution.estimate
+    deconvolution = solution.deconvolution
     g = deconvolution.g
     inputs = np.zeros((estimate.points.u.size, 0))
     if effects:
@@ -76,7 +72,7 @@ def field_errors(
     at_nodes = RectBivariateSpline(g.y, g.x, g.image)(inside_y, inside_x)
     at_nodes[np.hypot.outer(y, x) >= fields.support] = 0.0
     variances_of = _division_variances if deconvolution.divided else _posterior_variances
-    variances = variances_of(solution, deconvolution, (x, y), at_nodes.ravel(), inputs)
+    variances = variances_of(solution, (x, y), at_nodes.ravel(), inputs)
     variances[0] *= solution.band.excess**2
     errors = np.sqrt(np.maximum(np.cumsum(variances, axis=0), 0.0))
     curved, straight = (
@@ -92,7 +88,7 @@ def _nodes(axis: FloatArray, width: float, reach: float) -> FloatArray:
     middle = axis.size // 2
     every = max(int(width / _PER_WIDTH / (axis[1] - axis[0])), 1)
     nodes: FloatArray = axis[middle % every :: every]
-    near: BoolArray = np.abs(nodes) <= max(reach, 4 * nodes[nodes.size // 2 + 1])
+    near: BoolArray = abs(nodes) <= max(reach, 4 * nodes[nodes.size // 2 + 1])
     return nodes[near]
 
 
@@ -117,11 +113,7 @@ def _kernels(estimate: ProfileEstimate, x: FloatArray, y: FloatArray) -> ArrayFu
 
 
 def _posterior_variances(
-    solution: Solution,
-    deconvolution: Deconvolution,
-    axes: ArrayPair,
-    g: FloatArray,
-    inputs: FloatArray,
+    solution: Solution, axes: ArrayPair, g: FloatArray, inputs: FloatArray
 ) -> FloatArray:
     """Variances of G (2, nodes) by noise, and by the rest of the posterior and inputs (n, q)."""
     estimate = solution.estimate
@@ -131,7 +123,7 @@ def _posterior_variances(
     for columns in (estimate.scattered(gain), np.hstack([estimate.fixed_root, gain @ inputs])):
         changes = kernels(columns) - np.outer(g, estimate.basis.integrals @ columns)
         variances.append(np.sum(changes**2, axis=1))
-    return np.array(variances) / deconvolution.conversion_constant**2
+    return np.array(variances) / solution.deconvolution.conversion_constant**2
 
 
 @array_record
@@ -172,12 +164,12 @@ class _Filter:
         every = 1
         for i, step in enumerate(fields.central.spacing):
             angle = 2 * np.pi * frequencies[i][band[i]]
-            waves = np.exp(-1j * np.multiply.outer(angle, np.rint(axes[i] / step)))
+            waves = np.exp(-1j * np.outer(angle, np.rint(axes[i] / step)))
             first = fields.index[i].min()
             nodes = np.arange(first, fields.index[i].max() + 1)
             at_nodes.append(waves)
             at_g.append(waves[:, stated[i]])
-            at_points.append(np.exp(-1j * np.multiply.outer(angle, nodes)))
+            at_points.append(np.exp(-1j * np.outer(angle, nodes)))
             index.append(fields.index[i] - first)
             every *= round((axes[i][1] - axes[i][0]) / step)
         box = (at_points[0].shape[1], at_points[1].shape[1])
@@ -249,21 +241,18 @@ def _by_parameters(
 
 
 def _division_variances(
-    solution: Solution,
-    deconvolution: Deconvolution,
-    axes: ArrayPair,
-    g: FloatArray,
-    inputs: FloatArray,
+    solution: Solution, axes: ArrayPair, g: FloatArray, inputs: FloatArray
 ) -> FloatArray:
     """Variances of G (2, nodes) by noise, and by inputs (n, q) and what a division takes away."""
     fields: Any = solution.fields
     estimate = solution.estimate
+    deconvolution = solution.deconvolution
     grid = fields.central
     shape = fields.confinement.shape
     x, y = axes
     # Nodes where G is stated.
     most = fields.support + 3 * fields.step
-    stated = (np.abs(y) <= most, np.abs(x) <= most)
+    stated = (abs(y) <= most, abs(x) <= most)
     inside = np.flatnonzero(np.logical_and.outer(*stated))
     window = deconvolution.quotient.window
     stress = grid.forward(fields.stress.values)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from functools import lru_cache
 
@@ -42,19 +43,18 @@ class GridChoice:
 def choose_grid(estimate: ProfileEstimate, band: Band) -> GridChoice:
     """Choose the grid from the scan: every length from a length of the data."""
     points = estimate.points
-    support = rounded_reach(float(estimate.distance.max()), points.step)
+    support = rounded_reach(estimate.distance.max(), points.step)
     if points.as_raster:
         # A square of this half width lies within the raster's longer side.
-        support = float(np.abs(points.x - estimate.centre[0]).max())
-    reference = np.abs(estimate.model.reference.values)
+        support = float(abs(points.x - estimate.centre[0]).max())
+    reference = abs(estimate.model.reference.values)
     # A shear's transform vanishes at k = 0, too: only what lies beyond its largest counts.
     beyond = np.arange(reference.size) > np.argmax(reference)
     closed = np.flatnonzero(beyond & (reference < 0.1 * NOISE_RATIO * band.weakest_reference))
     last = estimate.model.k[closed[0] if closed.size else -1]
     spacing = min(estimate.gaussian.width / _POINTS_PER_WIDTH, np.pi / (2 * last))
     spacing = float(support / (_COUNTED * np.ceil(support / spacing / _COUNTED)))
-    span = max(float(np.ptp(offset)) for offset in estimate.offset)
-    extent = max(span, 1.25 * support)
+    extent = max(1.25 * support, *map(np.ptp, estimate.offset))
     reasons = {
         "spacing": f"{spacing * 1e3:.4g} mm: {_POINTS_PER_WIDTH:g} points per Gaussian "
         "width, and the last wavenumber is at least twice the one where the window has closed",
@@ -90,8 +90,9 @@ class LineFields:
         cls, estimate: ProfileEstimate, spectrum: RadialSpectrum, choice: GridChoice
     ) -> LineFields:
         """Lift the profile of the voltages, by its transform, and the reference."""
-        cells = scipy.fft.next_fast_len(int(np.ceil(choice.extent / choice.spacing)), real=True)
-        grid = EvenGrid(cells + 1, choice.spacing)
+        spacing = choice.spacing
+        cells = scipy.fft.next_fast_len(math.ceil(choice.extent / spacing), real=True)
+        grid = EvenGrid(cells + 1, spacing)
         reference = estimate.model.reference
         if reference.source:
             # The grid does not sample the edge of a source, but its transform.
@@ -103,8 +104,8 @@ class LineFields:
             arrays = (a.tobytes() for a in (nodes.k, nodes.weights, reference.scalar.values))
             lifted = _lifted if grid.count < _MOST_KEPT else _lifted.__wrapped__
             stress = lifted(grid, *arrays)
-            voltage = Field(grid, on_grid(spectrum.scalar.at, grid, choice.spacing / 2))
-        inside = EvenGrid(round(choice.support / choice.spacing) + 1, choice.spacing)
+            voltage = Field(grid, on_grid(spectrum.scalar.at, grid, spacing / 2))
+        inside = EvenGrid(round(choice.support / spacing) + 1, spacing)
         support = (inside.count - 1) * inside.spacing
         confinement = cosine_taper(grid.radius, support)
         return cls(grid, voltage, stress, support, inside, confinement, estimate.distance)
@@ -152,7 +153,7 @@ class RasterFields:
         if points.as_raster:
             lattice = even_lattice(points.x, points.y, points.places[0].count)
         even = lattice is not None
-        if lattice is None and divided:
+        if divided and not lattice:
             raise InputError(
                 f"The raster's {points.u.size} points are not evenly spaced: they lie on no "
                 "lattice of rows and columns within a tenth of its step.",
@@ -160,15 +161,15 @@ class RasterFields:
                 cure='Use method="bayesian" (--method bayesian) without a sweep, which needs no '
                 "lattice; or scan evenly.",
             )
-        if lattice is None:
+        if not lattice:
             steps = next(places.steps for places in points.places if all(places.steps))
-            nowhere = np.zeros(0, dtype=np.intp)
+            nowhere = np.zeros(0, np.intp)
             lattice = (
                 EvenAxis(points.x.min(), steps[0], nowhere),
                 EvenAxis(points.y.min(), steps[1], nowhere),
             )
-        x, columns = _continued(lattice[0], float(np.ptp(points.x)), choice.extent)
-        y, rows = _continued(lattice[1], float(np.ptp(points.y)), choice.extent)
+        x, columns = _continued(lattice[0], np.ptp(points.x), choice.extent)
+        y, rows = _continued(lattice[1], np.ptp(points.y), choice.extent)
         grid = Lattice(x - estimate.centre[0], y - estimate.centre[1])
         step = choice.spacing / 2
         reference = estimate.model.reference
@@ -228,13 +229,14 @@ class RasterFields:
         profiled = np.ones_like(self.voltage.values)
         np.subtract.at(profiled, self.index, share * smoothed.estimate.points.load)
         radius = self.grid.radius
-        table = wave_table(0, False, float(radius.max()), smoothed.estimate.model.k.tobytes())
+        table = wave_table(0, False, radius.max(), smoothed.estimate.model.k.tobytes())
+        coefficients = table.spline.c
         everywhere = table.interpolation(radius.ravel())
         # J0(k r) J0(k' r) over what has something of the profile, by the table's splines.
-        both = (everywhere.T @ everywhere.multiply(profiled.reshape(-1, 1))) @ table.spline.c
-        elsewhere = (table.spline.c.T @ both) * smoothed.spectrum.wavenumbers.weights
+        both = (everywhere.T @ everywhere.multiply(profiled.reshape(-1, 1))) @ coefficients
+        elsewhere = (coefficients.T @ both) * smoothed.spectrum.wavenumbers.weights
         own = table.interpolation(radius[self.index]).multiply(share[:, None]).tocsr()
-        by_points = VoltageMap(((table.spline.c.T, own),))
+        by_points = VoltageMap(((coefficients.T, own),))
         by_profile: VoltageMap = elsewhere @ smoothed.gain
         return (by_points + by_profile) * self.grid.cell_area
 
@@ -242,16 +244,16 @@ class RasterFields:
         """Return a kernel on its support."""
         step = self.grid.x[1] - self.grid.x[0]
         # Odd, so that the kernel's zero stays a point of the lattice.
-        least = int(np.ceil(step / (2.0 * self.step))) | 1
-        finer = int(np.ceil(step / (2.0 / 3 * self.step))) | 1
+        least = math.ceil(step / (2.0 * self.step)) | 1
+        finer = math.ceil(step / (2.0 / 3 * self.step)) | 1
         refinement = max(min(5, finer), least)
         fine, values = self.grid.refined(kernel, refinement)
-        if profile is not None:
+        if profile:
             values = self._lifted(profile.radial, fine)
-        inside_x = np.abs(fine.x) <= self.support
-        inside_y = np.abs(fine.y) <= self.support
-        plane = values[np.ix_(inside_y, inside_x)]
-        return Field(Lattice(fine.x[inside_x], fine.y[inside_y]), plane)
+        inside_x = abs(fine.x) <= self.support
+        inside_y = abs(fine.y) <= self.support
+        inside = np.ix_(inside_y, inside_x)
+        return Field(Lattice(fine.x[inside_x], fine.y[inside_y]), values[inside])
 
 
 @lru_cache(maxsize=6)
@@ -268,8 +270,8 @@ Fields = LineFields | RasterFields
 
 def _continued(axis: EvenAxis, reach: float, extent: float) -> tuple[FloatArray, IndexArray]:
     """Continue a raster's axis on both sides, to an odd number of nodes; index the points."""
-    steps = int(np.rint(reach / axis.step))
-    padding = int(np.ceil(max(2 * extent - reach, 0.0) / (2 * axis.step))) + 1
+    steps = round(reach / axis.step)
+    padding = math.ceil(max(2 * extent - reach, 0.0) / (2 * axis.step)) + 1
     count = steps + 1 + 2 * padding + steps % 2
     nodes = axis.start + axis.step * (np.arange(count) - padding)
-    return np.asarray(nodes, dtype=np.float64), axis.index + padding
+    return np.asarray(nodes, np.float64), axis.index + padding

@@ -28,7 +28,7 @@ from memscal.model.arrays import FloatArray, Values, value_record
 from memscal.model.bayes_factor import POSITIVE, STRONG, BayesFactor
 from memscal.model.checks import Message
 from memscal.model.film import LINEAR, NEO_HOOKEAN, ElasticFilm, law_in_words
-from memscal.model.notation import VOLTS, Reading, format_measured
+from memscal.model.notation import Reading, format_measured
 from memscal.model.quantities import MM
 from memscal.model.scan import Scan
 
@@ -53,7 +53,7 @@ class FilmLawComparison:
     laws: tuple[WeighedLaw, ...]
     reference: str
     loads: tuple[float, ...]  # in N
-    reading: Reading = VOLTS
+    reading: Reading
 
     def factor(self, law: WeighedLaw) -> BayesFactor:
         """Return the Bayes factor of the best law against one."""
@@ -135,7 +135,7 @@ def weigh_laws(solution: Solution) -> FilmLawComparison | None:
     laws = []
     for law, by_law in solutions.items():
         estimate = replace(by_law.estimate, weights=weights, outlier_weight=outlier)
-        evidence = float(log_marginal_likelihood(estimate, _input_columns(by_law), noise)[0])
+        evidence = log_marginal_likelihood(estimate, _input_columns(by_law), noise)[0]
         a = by_law.deconvolution.conversion_constant
         laws.append(WeighedLaw(law, evidence, a, estimate.gaussian.sigma))
     laws.sort(key=lambda law: -law.log_evidence)
@@ -146,10 +146,11 @@ def _input_columns(solution: Solution, without: str = "") -> FloatArray:
     """Voltages by one standard uncertainty of each stated input, (n, q), in V."""
     estimate = solution.estimate
     effects = input_effects(solution.scans, solution.stresses, estimate)
-    columns = []
-    for name, effect in effects.items():
-        if name != "load" and name.rstrip("0123456789") != without:
-            columns.append(effect.voltage)
+    columns = [
+        effect.voltage
+        for name, effect in effects.items()
+        if name != "load" and name.rstrip("0123456789") != without
+    ]
     # A balance's error may differ from load to load; repeats at one load share it.
     pairs = zip(solution.owners, solution.scans, strict=True)
     balances = [(owner, scan.stated_load, scan.load_uncertainty) for owner, scan in pairs]
@@ -157,7 +158,7 @@ def _input_columns(solution: Solution, without: str = "") -> FloatArray:
         _, load, u = balance
         weighed = np.array([other == balance for other in balances])[estimate.points.scan]
         columns.append(np.where(weighed, estimate.signal * (u or 0.0) / load, 0.0))
-    return np.stack(columns, axis=1)
+    return np.column_stack(columns)
 
 
 @value_record
@@ -250,8 +251,7 @@ def require_free(
             cure="State it (memscal import --thickness-uncertainty, or "
             "/entry/sample/film/thickness_uncertainty).",
         )
-    references = [*stated, *(scan.reference for scan in scans)]
-    if any(reference is not None for reference in references):
+    if any(stated) or any(scan.reference for scan in scans):
         raise InputError(
             "A reference is given, of one thickness.",
             why="To estimate the thickness the rod is solved on films of others.",
@@ -271,9 +271,10 @@ def free_thickness(solution: Solution) -> FreeThickness:
     nodes = estimate.model.reference.wavenumbers
 
     def log_posterior(z: FloatArray) -> FloatArray:
-        varied = {}
-        for film, thickness in zip(films, stated + z * u, strict=True):
-            varied[film] = replace(film, thickness=float(thickness))
+        varied = {
+            film: replace(film, thickness=float(thickness))
+            for film, thickness in zip(films, stated + z * u, strict=True)
+        }
         rods = [press_rod(*s.set_up._replace(film=varied[s.set_up.film])) for s in scans]
         model = ForwardModel(estimate.points, reference_spectra(rods, points, nodes))
         varied_estimate = replace(estimate, model=model)

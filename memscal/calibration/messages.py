@@ -44,9 +44,9 @@ def calibration_messages(
     channel = estimate.points.channel
     stress = solution.stress
     yield from quality.override_messages(prepared.overridden)
-    if laws is not None:
+    if laws:
         yield laws.message
-    if prepared.thickness is not None:
+    if prepared.thickness:
         yield from prepared.thickness.messages
     yield from _unstated_load(prepared, solution)
     yield from quality.failed_check_messages(checks)
@@ -73,12 +73,12 @@ def calibration_messages(
     yield from point_messages(estimate)
     for scan in prepared.as_stated:
         yield from record_messages(scan)
-    if estimate.points.u_errors is None:
+    if not estimate.points.noise_stated:
         yield _noise(estimate, results)
     yield from _method(solution)
     yield from _form_of_g(results)
     form = stress.form
-    if form is not None:
+    if form:
         text = (
             f"The reference is a {form}, taken as exact: A is the reading over its unit, "
             f"{form.unit}. Film and rod do not enter: what they blur is in G."
@@ -90,7 +90,7 @@ def calibration_messages(
             "The reference states no convergence: its own error is not counted.",
         )
     counted = results.budget["conversion_constant"]
-    if form is None:
+    if not form:
         yield from _law(solution, results)
         yield from _unstated(solution, counted)
     yield from _assumed(assumptions, counted)
@@ -126,7 +126,7 @@ def _centres(solution: Solution) -> Message:
     reason = "as asked for (--centre per-repeat)"
     if loads_differ([scan.stated_load for scan in solution.scans]):
         reason = "as their loads differ, and with them the shape of the stress"
-    elif test is not None:
+    elif test:
         reason = f"as one centre has a p-value of {test.p_value:.1g} (--centre common takes one)"
     return Message(
         quality.REPEAT_CENTRES,
@@ -192,8 +192,9 @@ def _law(solution: Solution, results: Results) -> Iterator[Message]:
     parameters = results.parameters
     rows = [parameters.names.index(name) for name in MOVED[:2]]
     if law == LINEAR:
-        text = "The film is taken as linear elastic, as stated; no other law is counted."
-        yield Message("film_law", text)
+        yield Message(
+            "film_law", "The film is taken as linear elastic, as stated; no other law is counted."
+        )
         return
 
     def changed(by: str) -> str:
@@ -246,7 +247,7 @@ _INPUTS = (
 def _unstated(solution: Solution, counted: Container[str]) -> list[Message]:
     """Return which inputs that no assumption is about state no uncertainty."""
     film = solution.scan.film
-    if film is None:
+    if not film:
         return []
     if not any(source in counted for source in _INPUTS):
         text = "No uncertainty of film, rod and load is stated: ± counts noise alone."

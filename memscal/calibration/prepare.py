@@ -104,7 +104,13 @@ def prepare(as_stated: Sequence[Scan], request: Request) -> Prepared:
         require_calibration_rod(scan, given)
         scan = _with_law(scan, given, request)
         stated.append(given or scan.reference)
-        scans.append(_without_loads(scan, stated[-1]) if request.relative else scan)
+        if request.relative:
+            # A rod that has to be solved keeps its nominal load.
+            load = None if stated[-1] else scan.load
+            scan = replace(
+                scan, load=load, load_uncertainty=None, normal_load=None, normal_load_errors=None
+            )
+        scans.append(scan)
     alternatives = None
     if request.alternative is not None:
         alternatives = _references(request.alternative, scans, replace(request, pixel_size=None))
@@ -124,7 +130,7 @@ def prepare(as_stated: Sequence[Scan], request: Request) -> Prepared:
     peak = None
     per = stresses[0].unit
     if request.relative:
-        peak = float(np.abs(stress_table(stresses[0]).sigma_zz).max())
+        peak = float(abs(stress_table(stresses[0]).sigma_zz).max())
         # A point has no largest value, but a unit integral.
         per = RELATIVE if peak else f"{RELATIVE} {per}"
         peak = peak or 1.0
@@ -146,7 +152,7 @@ def _with_law(scan: Scan, reference: BaseStress | None, request: Request) -> Sca
     """Return the scan with the law and the rod's friction that are known: asked for, or stated."""
     law = request.film_law
     if law is not None:
-        if reference is not None:
+        if reference:
             raise InputError(
                 f"A film law ({law}) and a reference are given.",
                 why="A reference has been calculated by a law already.",
@@ -172,24 +178,13 @@ def _with_law(scan: Scan, reference: BaseStress | None, request: Request) -> Sca
 
 def _with_some_load(scan: Scan) -> Scan:
     """Return the scan with a load where none is stated, for a relative A knows no other."""
-    if scan.load is not None or scan.reference is not None:
+    if scan.load is not None or scan.reference:
         return scan
     # 1 N, or less where the rod would sink deeper than finite elements can follow.
     light = replace(scan, load=_LIGHT).set_up.under(LINEAR)
     per_newton = press_rod(*light).depth / _LIGHT
     deepest = min(0.4 * light.film.thickness, 3 * light.indenter.radius)
     return replace(scan, load=min(1.0, deepest / per_newton))
-
-
-def _without_loads(scan: Scan, stress: BaseStress | None) -> Scan:
-    """Return the scan without loads; a rod that has to be solved keeps its nominal one."""
-    return replace(
-        scan,
-        load=None if stress else scan.load,
-        load_uncertainty=None,
-        normal_load=None,
-        normal_load_errors=None,
-    )
 
 
 def _references(
@@ -218,7 +213,7 @@ def _read(reference: Reference, load: float, request: Request) -> BaseStress | N
         )
     elif isinstance(reference, IdealReference | StressField):
         reference = reference.profile()
-    if isinstance(reference, StressProfile) and reference.form is not None:
+    if isinstance(reference, StressProfile) and reference.form:
         stated = reference.form.load if isinstance(reference.form, StressField) else None
         return replace(reference, load=stated or load)
     if reference is None or isinstance(reference, BaseStress):

@@ -84,11 +84,12 @@ def solved(
     stresses: Sequence[BaseStress],
     estimate: ProfileEstimate,
     method: Method,
+    of_grid: ProfileEstimate | None = None,
 ) -> Solution:
-    """Find A and G from the estimate of the profile; see :func:`solve`."""
+    """Find A and G from the estimate of the profile, or with the grid of another's width."""
     smoothed = None if estimate.points.order else smooth_profile(estimate)
     band = find_band(estimate, smoothed)
-    choice = choose_grid(estimate, band)
+    choice = choose_grid(of_grid or estimate, band)
     fields = prepare_fields(estimate, smoothed, choice, divided=not isinstance(method, Bayesian))
     band = beyond_zeros(band, estimate, fields.grid.wavenumber, fields.voltage.transform)
     gaussian = _misfit(estimate, estimate.gaussian.predicted)
@@ -155,7 +156,7 @@ def deconvolve(
     sigma = fit_gaussian(g, estimate.gaussian.sigma)
     # Eq. 1: the voltage that A and G predict, of each scan through its own reference.
     model = estimate.model
-    if posterior is not None:
+    if posterior:
         signal = model.signal(model.geometry(estimate.centres), posterior.kernel) + estimate.oval
     elif estimate.points.scans == 1 and model.reference.order != ACROSS:
         signal = fields.convolved(quotient) * estimate.points.load
@@ -167,7 +168,7 @@ def deconvolve(
     misfit = _misfit(estimate, predicted)
     # What the window takes from the estimate of G, that of the posterior.
     passed = np.interp(model.k, fields.grid.wavenumber_axis, quotient.window[0], right=0.0)
-    lost = (1 - passed if posterior is None else np.zeros_like(passed)) * estimate.kernel / a
+    lost = (np.zeros_like(passed) if posterior else 1 - passed) * estimate.kernel / a
     hidden = model.reference.wavenumbers.synthesise(lost, g.r)
     return Deconvolution(quotient, a, g, sigma, hidden, predicted, misfit, posterior is None)
 
@@ -192,7 +193,7 @@ def prepare_fields(
 ) -> Fields:
     """Lift the profile of lines or several scans, or place a raster (evenly if it is divided)."""
     data = estimate.points
-    if smoothed is not None and (data.as_raster or (data.planar and not divided)):
+    if smoothed and (data.as_raster or (data.planar and not divided)):
         return RasterFields.place(estimate, smoothed, choice, divided)
     if divided and not (estimate.model.sums_waves or data.as_raster):
         raise InputError(
@@ -223,7 +224,7 @@ class Deconvolution:
     hidden: FloatArray  # (m,): what the window takes from G at its radii, in 1/m^2
     predicted: FloatArray  # (n,): voltages at the measured points, in V
     misfit: Misfit
-    divided: bool = True  # by a division of the fields; else the posterior's
+    divided: bool  # by a division of the fields; else the posterior's
 
 
 @array_record
@@ -252,14 +253,15 @@ class Solution:
     @cached_property
     def other(self) -> Deconvolution | None:
         """A and G by the other route, if it is open: Bayesian beside a division, or back."""
+        if not self.comparable:
+            return None
         other = WhiteNoise() if isinstance(self.method, Bayesian) else Bayesian()
-        steps = self.estimate, self.band, self.fields, other
-        return deconvolve(*steps) if self.comparable else None
+        return deconvolve(self.estimate, self.band, self.fields, other)
 
     @property
     def on_films(self) -> bool:
         """Whether every scan has a film that counts."""
-        return all(scan.film is not None for scan in self.scans)
+        return all(scan.film for scan in self.scans)
 
     @property
     def per_repeat(self) -> bool:
@@ -283,12 +285,12 @@ class Solution:
         reach = self.choice.support
         if spectrum.order:
             r = np.linspace(0.0, _FAR * reach, _RADII)
-            flux = np.abs(spectrum.at(r)) * (r if spectrum.order > 0 else 1.0)
+            flux = abs(spectrum.at(r)) * (r if spectrum.order > 0 else 1.0)
             return float(flux[r > reach].sum() / flux.sum())
         # Within R the integral is that of R U(k) J_1(kR) dk over all k.
         k = spectrum.wavenumbers.k
         dk = 2 * np.pi * spectrum.wavenumbers.weights / k
-        inside = reach * float(np.sum(dk * spectrum.values * j1(k * reach)))
+        inside = reach * np.sum(dk * spectrum.values * j1(k * reach))
         return abs(1 - inside / spectrum.integral)
 
 
@@ -297,9 +299,9 @@ def _misfit(estimate: ProfileEstimate, predicted: FloatArray) -> Misfit:
     data = estimate.points
     residual = data.u - predicted
     weight = estimate.outlier_weight
-    degrees = float(weight.sum()) + data.curved.size - estimate.gaussian.jacobian.shape[1]
+    degrees = weight.sum() + data.curved.size - estimate.gaussian.jacobian.shape[1]
     rms = float(np.sqrt(np.average(residual**2, weights=weight)) / estimate.largest_signal)
     # As stated, uncertain positions and correlations included, where anything is stated.
-    noise = 1.0 if data.u_errors is not None else estimate.noise_scale
-    square = float(np.sum(data.standardised(residual, estimate.weights) ** 2))
+    noise = 1.0 if data.noise_stated else estimate.noise_scale
+    square = np.sum(data.standardised(residual, estimate.weights) ** 2)
     return Misfit(rms, square / noise**2 / degrees, degrees)

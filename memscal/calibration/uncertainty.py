@@ -13,6 +13,7 @@ load scales A; on a film at finite strain it changes the base stress per newton 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
@@ -105,7 +106,7 @@ def input_effects(
             errors = hankel_transform(stress.r, stress.sigma_zz_errors, model.k) / stress.load
             blank = [np.zeros_like(errors) for _ in scans]
             changes.setdefault("reference_stress", blank)[i] = errors
-    if alternatives is not None:
+    if alternatives:
         pairs = zip(alternatives, model.references, strict=True)
         changes["model_form"] = [RECTANGLE * (other.values - own.values) for other, own in pairs]
     effects = {n: InputEffect(-signal_by(estimate, change)) for n, change in changes.items()}
@@ -131,7 +132,7 @@ def _taken_for_granted(scans: Sequence[Scan], estimate: ProfileEstimate) -> dict
     effects = {}
     for name, u in stated.items():
         influence = found.get({"position_scale": "stage_scale"}.get(name, name))
-        if influence is not None:
+        if influence:
             # The mean of a square is corrected; its standard deviation is left.
             change = u * influence.voltage + 2**0.5 * u**2 * influence.squared
             effects[name] = InputEffect(-change)
@@ -155,7 +156,7 @@ def _load_effects(
             continue
         by_scan = np.array([share or 0.0 for share in stated])
         apart = (by_scan - by_scan.mean())[estimate.points.scan]
-        effects[source] = InputEffect(-apart * estimate.signal, -float(by_scan.mean()))
+        effects[source] = InputEffect(-apart * estimate.signal, -by_scan.mean())
     return effects
 
 
@@ -174,13 +175,13 @@ def _varying_gain(estimate: ProfileEstimate) -> float:
     products = []
     for repeat in repeats:
         data, own = np.split(columns[points.repeat == repeat], [2], axis=1)
-        data = data - own @ np.linalg.lstsq(own, data, rcond=None)[0]
+        data = data - own @ np.linalg.lstsq(own, data)[0]
         products.append(data[:, 0] @ data)
     weight, product = np.transpose(products)
     # A repeat that tells nothing of its gain lets no variation be found.
     weight = np.maximum(weight, 1.0)
     variance = np.var(product / weight, ddof=1) - np.mean(1 / weight)
-    return float(np.sqrt(max(variance, 0.0) / repeats.size))
+    return math.sqrt(max(variance, 0.0) / repeats.size)
 
 
 def correlation_matrix(sources: Sequence[str], correlations: Correlations) -> FloatArray:
@@ -198,7 +199,7 @@ def correlation_matrix(sources: Sequence[str], correlations: Correlations) -> Fl
             raise InputError(f"The correlation of {names} is {coefficient:g}, outside -1 to 1.")
         i, j = (sources.index(name) for name in pair)
         matrix[i, j] = matrix[j, i] = coefficient
-    least = float(np.linalg.eigvalsh(matrix)[0]) if sources else 1.0
+    least = np.linalg.eigvalsh(matrix)[0] if sources else 1.0
     if least < -1e-9:
         raise InputError(
             "The correlations of the inputs contradict each other: their matrix has the eigenvalue "
@@ -217,7 +218,7 @@ class Results:
     changes: Arrays  # (p,) by input: of the parameters, by one uncertainty of it
     budget: Mapping[str, Mapping[str, float]]  # standard uncertainties by parameter and source
     radial_covariance: FloatArray  # (n, n): covariance of G(r), in 1/m^4
-    cross_covariance: FloatArray  # (n, p): covariance of G(r) with the parameters, in their units
+    with_constant: FloatArray  # (n,): covariance of G(r) with A
     transfer_errors: FloatArray  # (m,): standard uncertainty of the transfer function
     radial_scatter: FloatArray  # (n,): u of G(r) by noise, baseline and inputs, in 1/m^2
     by_voltage: VoltageMap  # (p, n): derivatives of the parameters
@@ -289,17 +290,17 @@ def propagate(
     misfit = _misfit_columns(estimate, by_voltage[rows])
     columns["misfit"] = np.zeros((len(by_voltage), misfit.shape[1]))
     columns["misfit"][rows] = misfit
-    if drawn is not None:
+    if drawn:
         columns["noise"] = _drawn_columns(by_voltage, names, columns["noise"], drawn)
     independent = list(columns.values())
     count = len(names)
     if effects:
-        changes = by_voltage @ np.stack([effect.voltage for effect in effects.values()], axis=1)
+        changes = by_voltage @ np.column_stack([effect.voltage for effect in effects.values()])
         # No factor changes G and its transfer, beyond the named numbers.
         scaled = [name.startswith("conversion_constant") for name in names]
         for (source, effect), column in zip(effects.items(), changes.T, strict=True):
             column[:count] += np.where(scaled, values, 0.0) * effect.scaling
-            if effect.exact is not None:
+            if effect.exact:
                 _replace_exactly(column, names, values, deconvolution, effect.exact, wavenumbers)
             columns[source] = column[:, None]
         independent.append(changes @ square_root(correlation_matrix(list(effects), correlations)))
@@ -322,7 +323,7 @@ def propagate(
         changes={source: columns[source][:count, 0] for source in effects},
         budget={name: _budget(names.index(name), columns, stored) for name in BUDGETED},
         radial_covariance=stored[count:, count:],
-        cross_covariance=stored[count:, :count],
+        with_constant=stored[count:, 0],
         transfer_errors=np.linalg.norm(everything[stop:], axis=1),
         radial_scatter=np.linalg.norm(scatter[count:stop], axis=1),
         by_voltage=by_voltage[:count],
@@ -358,11 +359,11 @@ def _effective_degrees(
 ) -> dict[str, float]:
     """Degrees of freedom of each uncertainty, of which an estimated noise alone has few."""
     # Welch and Satterthwaite: GUM (JCGM 100:2008), G.4.1.
-    if estimate.points.u_errors is not None:
+    if estimate.points.noise_stated:
         return {}
-    readings = float(estimate.outlier_weight.sum()) + estimate.points.curved.size
+    readings = estimate.outlier_weight.sum() + estimate.points.curved.size
     degrees = max(readings - estimate.basis.flat, 1.0)
-    if estimate.raster_noise is not None:
+    if estimate.raster_noise:
         degrees = max(degrees, estimate.raster_noise.degrees)
     variances = np.diag(covariance)[: len(names)]
     shares = np.sum(noise[: len(names)] ** 2, axis=1) / variances
@@ -399,7 +400,7 @@ def _replace_exactly(
     # Those of centre, baseline and drift stay.
     same = exact.deconvolution.divided == deconvolution.divided
     other = exact.deconvolution if same else exact.other
-    assert other is not None
+    assert other
     r = deconvolution.g.r
     fit = exact.estimate.gaussian
     numbers, g = read_off(other, r)
@@ -445,7 +446,7 @@ def _budget(row: int, columns: Arrays, covariance: FloatArray) -> dict[str, floa
     variance = covariance[row, row]
     excess = variance - sum(u**2 for u in budget.values())
     if abs(excess) > _ROUNDING * variance:
-        budget["correlations"] = float(np.copysign(np.sqrt(abs(excess)), excess))
+        budget["correlations"] = math.copysign(math.sqrt(abs(excess)), excess)
     return budget
 
 
@@ -461,7 +462,7 @@ def _parameters(
     radial = kernel[1 : 1 + g.r.size]
     functionals = kernel_functionals(g, deconvolution.gaussian_sigma, deconvolution.hidden)
     widths = radial.combined(np.stack([functional.row for functional in functionals]))
-    if division is not None:
+    if division:
         lost = functionals[1].row @ division.lost[1 : 1 + g.r.size]
         lost[0] -= functionals[1].row @ deconvolution.hidden
         widths = _corrected_full_width(widths, lost, estimate)
@@ -545,7 +546,7 @@ def _kernel_derivatives(
 ) -> tuple[_Derivatives, DivisionMap | None]:
     """Derivatives of A, G at its radii and its transfer function by either route."""
     estimate = solution.estimate
-    if not deconvolution.divided or solution.smoothed is None:
+    if not deconvolution.divided or not solution.smoothed:
         return _posterior_kernel(estimate, deconvolution, wavenumbers), None
     division = _division_map(solution, solution.smoothed, deconvolution, wavenumbers)
     # Centre, baseline and drift are parameters of the estimate.
@@ -611,7 +612,7 @@ def _division_map(
     rings = ring_areas(r)
 
     # From changes of A G at its radii to those of A, G and its transfer function.
-    by_radius = (np.eye(r.size) - np.multiply.outer(deconvolution.g.radial, rings)) / a
+    by_radius = (np.eye(r.size) - np.outer(deconvolution.g.radial, rings)) / a
     normalised = np.vstack([rings, by_radius, (bessel_table(wavenumbers, r) * rings) @ by_radius])
     gain = fields.gain(smoothed) if isinstance(fields, RasterFields) else smoothed.gain
     direct = normalised @ synthesis @ gain
@@ -632,10 +633,10 @@ def route_difference(solution: Solution, division: DivisionMap | None) -> float 
     # Of the division of the Bayesian fit's residuals: A's in standard deviations, or the root of
     # G's squared integral over its expectation, if that is larger.
     estimate = solution.estimate
-    if division is None or not solution.comparable:
+    if not (division and solution.comparable):
         return None
     divided = solution.deconvolution if solution.deconvolution.divided else solution.other
-    assert divided is not None
+    assert divided
     rings = ring_areas(divided.g.r)
     # A and G, without the transfer function.
     direct = division.direct[: 1 + rings.size]

@@ -151,14 +151,17 @@ _NAMED = 12
     "File to write what was given to, for --recipe of import and batch."
 )
 @option("--name-pattern", "PATTERN")(
-    "Scan: what the names of tables state, such as die_{row}_{col}: {row}, {col}, or {x}, {y} in "
-    "mm, the place on the wafer (to FOLDER/manifest.csv); {sensor} its name, which is otherwise "
-    "the table's; {any} is skipped."
+    "Scan: what the names of tables state, such as die_{row}_{col}: {row} and {col} the place on "
+    "the wafer (to FOLDER/manifest.csv); {sensor} its name, which is otherwise the table's; {any} "
+    "is skipped."
 )
 @option("--die-pitch", click.FloatRange(0, min_open=True), nargs=2, metavar="MM MM")(
     "Scan: distance of columns and of rows on the wafer, in mm.  [default: places count dies]"
 )
-@option("--resume", is_flag=True)("Several tables: keep scans that are there, as they are.")
+@option("--resume", is_flag=True)(
+    "Several tables: keep scans that are there; other options than FOLDER/import.json has are "
+    "refused."
+)
 @option("--dry-run", is_flag=True)(
     "Read every table, say what would be written, and write nothing."
 )

@@ -100,15 +100,18 @@ def warn(text: str) -> None:
 _PARTICULARS = re.compile(r"\([^)]*\)|[-+]?\d[\d.e+-]*")
 
 
-def show_messages(messages: Iterable[Message]) -> None:
-    """Write the messages of a result to standard error, those that say the same once."""
+def show_messages(messages: Iterable[Message], owners: str = "") -> None:
+    """Write messages to standard error, those that say the same once; of how many owners, too."""
     alike: dict[tuple[str, str, str], list[str]] = {}
     # What the answer says is not said again.
-    for item in (item for item in messages if item.kind != NOISE_ALONE):
-        key = item.kind, item.severity, _PARTICULARS.sub("", item.text)
-        alike.setdefault(key, []).append(item.text)
+    for item in messages:
+        if item.kind != NOISE_ALONE:
+            key = item.kind, item.severity, _PARTICULARS.sub("", item.text)
+            alike.setdefault(key, []).append(item.text)
     for (_, severity, _), (text, *others) in alike.items():
         more = f" ({len(others)} more like it; --json lists all.)" if others else ""
+        if owners:
+            more = f" ({owners}: {len(others) + 1})"
         (warn if severity == "warning" else note)(text + more)
 
 

@@ -69,7 +69,7 @@ class AngularRings:
     def transform(self, m: int, k: FloatArray) -> FloatArray:
         """Transforms of order m at ``k`` (rad/m), (k, q)."""
         blurred = np.exp(-0.5 * (self.blur * k) ** 2)[:, None]
-        return blurred * bessel(m, np.multiply.outer(k, self.radius))
+        return blurred * bessel(m, np.outer(k, self.radius))
 
 
 @array_record
@@ -99,7 +99,7 @@ class AngularDepartures:
         near = np.hypot(plane_x, plane_y) < rings.radius[-1] + _BLURS * rings.blur
         r = np.hypot(plane_x[near], plane_y[near])
         angle = np.arctan2(plane_y[near], plane_x[near])
-        table = step * np.arange(float(np.ceil(r.max(initial=0.0) / step)) + 4)
+        table = step * np.arange(np.ceil(r.max(initial=0.0) / step) + 4)
         for i, amplitudes in enumerate(self._by_rings(coefficients)):
             m = ORDERS[i // 2]
             turn = (np.cos, np.sin)[i % 2]
@@ -131,7 +131,7 @@ class AngularDepartures:
 def rings_of_order(m: int, r: FloatArray, radius: FloatArray, blur: float) -> FloatArray:
     """Blurred rings of order m at radii (n,) in m, for unit amplitudes: (n, q), in 1/m^2."""
     near = np.exp(-0.5 * (np.subtract.outer(r, radius) / blur) ** 2)
-    return near * ive(m, np.multiply.outer(r, radius / blur**2)) / (2 * np.pi * blur**2)
+    return near * ive(m, np.outer(r, radius / blur**2)) / (2 * np.pi * blur**2)
 
 
 def angular_departures(
@@ -161,8 +161,7 @@ def angular_departures(
     free = by_rings @ amplitudes
     free -= base @ (base.T @ free)
     data -= base @ (base.T @ data)
-    strengths = _expected_strengths(free, data, order)
-    return AngularDepartures(rings, amplitudes * strengths[order])
+    return AngularDepartures(rings, amplitudes * _expected_strengths(free, data, order)[order])
 
 
 def _unit_amplitudes(radius: FloatArray, width: float) -> list[FloatArray]:

@@ -52,8 +52,8 @@ def find_band(estimate: ProfileEstimate, smoothed: SmoothedProfile | None) -> Ba
     reference = envelope(estimate.model.reference.values)
     error = np.maximum(transfer_uncertainty(estimate), TINY)
     clear = RELEVANT
-    signal = np.abs((smoothed or estimate).spectrum.values)
-    if smoothed is None:
+    signal = abs((smoothed or estimate).spectrum.values)
+    if not smoothed:
         noise = error * estimate.conversion_constant * reference
     elif estimate.points.as_raster:
         # Of all points of a raster the noise is equal at all wavenumbers.
@@ -67,9 +67,9 @@ def find_band(estimate: ProfileEstimate, smoothed: SmoothedProfile | None) -> Ba
     relevant = min(_falls_below(k, signal / noise, clear), sampled)
     ratio = gaussian_transfer(k, estimate.gaussian.sigma) / error
     lost = np.flatnonzero(ratio < RESOLVED)
-    end = int(lost[0]) + 1 if lost.size else k.size
+    end = lost[0] + 1 if lost.size else k.size
     resolved = min(_falls_below(k[:end], ratio[:end], RESOLVED), sampled)
-    weakest = (float(np.interp(relevant, k, modulus)) for modulus in (signal, reference))
+    weakest = (np.interp(relevant, k, modulus) for modulus in (signal, reference))
     return Band(relevant, resolved, *weakest)
 
 
@@ -87,29 +87,29 @@ def beyond_zeros(
         return band
     # Root mean square over directions of the residuals' transform where the reference vanishes.
     shares = _shares(estimate)
-    noise = float(np.linalg.norm(shares * estimate.noise))
+    noise = np.linalg.norm(shares * estimate.noise)
     angle = np.pi * np.arange(_DIRECTIONS) / _DIRECTIONS
     along = np.outer(points.x, np.cos(angle)) + np.outer(points.y, np.sin(angle))
     sums = (shares * (points.u - estimate.predicted)) @ np.exp(-1j * k[turns[0]] * along)
-    excess = max(float(np.linalg.norm(sums)) / _DIRECTIONS**0.5 / noise, 1.0)
+    excess = max(np.linalg.norm(sums) / _DIRECTIONS**0.5 / noise, 1.0)
     noise *= excess
     # The mean of two lobes over all directions is smaller than either: their power is not.
     width = wavenumber[0, 1]
     ring = np.rint(wavenumber / width).astype(np.intp).ravel()
-    power = np.bincount(ring, np.abs(voltage.ravel()) ** 2) / np.bincount(ring)
+    power = np.bincount(ring, abs(voltage.ravel()) ** 2) / np.bincount(ring)
     # Rings beyond, in the corners, have few components, any of which may be large by chance.
     rings = np.arange(0.0, np.pi / points.step, width)
     relevant = _falls_below(rings, np.sqrt(power[: rings.size]) / noise, _SEEN)
     weakest = noise / estimate.conversion_constant
-    share = min(_SEEN * weakest / float(np.interp(relevant, k, largest)), 1.0)
-    blur = float(np.sqrt(-2 * np.log(share))) / relevant
+    share = min(_SEEN * weakest / np.interp(relevant, k, largest), 1.0)
+    blur = np.sqrt(-2 * np.log(share)) / relevant
     weakest *= RELEVANT_OF_RASTER
     return Band(relevant, band.resolved, RELEVANT_OF_RASTER * noise, weakest, blur, excess)
 
 
 def envelope(reference: FloatArray) -> FloatArray:
     """Largest modulus of a transform from each wavenumber on: it falls, and has no zeros."""
-    return np.maximum.accumulate(np.abs(reference)[::-1])[::-1]
+    return np.maximum.accumulate(abs(reference)[::-1])[::-1]
 
 
 def _shares(estimate: ProfileEstimate) -> FloatArray:
@@ -130,7 +130,7 @@ def transfer_uncertainty(estimate: ProfileEstimate) -> FloatArray:
 def _falls_below(k: FloatArray, ratio: FloatArray, threshold: float) -> float:
     """Return where a ratio falls below a threshold for good, log-interpolated."""
     # The transform of a ring-shaped G passes through zero and comes back: such a gap ends no band.
-    i = int(np.flatnonzero(ratio >= threshold).max(initial=-1)) + 1
+    i = np.flatnonzero(ratio >= threshold).max(initial=-1) + 1
     if i in (0, k.size):
         return float(k[max(i - 1, 0)])
     upper = np.log(ratio[i - 1])

@@ -101,7 +101,7 @@ class _Sensors:
         data = data - start @ columns.T
         scale = np.linalg.norm(values, axis=1, keepdims=True)
         q, r = np.linalg.qr(values / scale)
-        diagonal = np.abs(np.diagonal(r, axis1=1, axis2=2))
+        diagonal = abs(np.diagonal(r, axis1=1, axis2=2))
         log_determinant = np.log(diagonal * scale[:, 0]).sum(axis=1)
         rest = data - _times(q, _times(q.mT, data))
         return cls(start, (choice / scale) @ np.linalg.inv(r), q, log_determinant, data, rest)
@@ -227,7 +227,7 @@ def _likelihoods(
 ) -> ArrayTriple:
     """Log marginal likelihoods, variances of the residuals, and of the noise, (h,) each."""
     total = np.sum(sensors.rest**2, axis=1) + noise.added * noise.freedom
-    least = (_ROUNDING * np.abs(sensors.data).max(axis=1)) ** 2
+    least = (_ROUNDING * abs(sensors.data).max(axis=1)) ** 2
     total = total[family]
     least = np.maximum(least, 1e-300)[family]
     beyond = np.maximum(total - power.sum(axis=1), 0.0)
@@ -419,14 +419,14 @@ def _choice(flat: int, sizes: tuple[int, ...], families: tuple[Family, ...]) -> 
     # Beside a G that is free in the plane the Gaussian stands alone.
     asked = HYPOTHESES if sizes else HYPOTHESES[:1]
     known = [(i, h) for i, h in enumerate(asked) if h.family in (None, *families)]
-    family = np.zeros(len(known), dtype=np.intp)
+    family = np.zeros(len(known), np.intp)
     strength = np.ones(len(known))
     # Equal numbers of columns for all: one batch of decompositions.
-    places = np.zeros((len(known), max(sizes, default=1) + bool(families)), dtype=np.intp)
+    places = np.zeros((len(known), max(sizes, default=1) + bool(families)), np.intp)
     factors = np.zeros(places.shape)
     for row, (_, hypothesis) in enumerate(known):
         factor = hypothesis.strength
-        if hypothesis.family is None:
+        if not hypothesis.family:
             strength[row] = factor
             factor = 1.0
         else:
@@ -434,7 +434,7 @@ def _choice(flat: int, sizes: tuple[int, ...], families: tuple[Family, ...]) -> 
             family[row] = 1 + families.index(hypothesis.family)
             places[row, -1] = ends[-1] + 3 * family[row] - 1
             factors[row, -1] = 1.0
-        if hypothesis.shape is not None:
+        if hypothesis.shape:
             shape = SHAPES.index(hypothesis.shape)
             places[row, : sizes[shape]] = np.arange(ends[shape], ends[shape + 1])
             factors[row, : sizes[shape]] = factor
@@ -444,7 +444,7 @@ def _choice(flat: int, sizes: tuple[int, ...], families: tuple[Family, ...]) -> 
 def supported(basis: DepartureBasis, weighed: WeighedFit) -> tuple[DepartureBasis, WeighedFit]:
     """Leave out the shapes and families of negligible probability."""
     variances = np.diag(weighed.covariance)
-    used = [bool(variances[block].any()) for block in basis.blocks]
+    used = [variances[block].any() for block in basis.blocks]
     columns = [np.arange(block.start, block.stop) for block in compress(basis.blocks, used)]
     chosen = np.concatenate([np.arange(basis.flat), *columns])
     rings = tuple(compress(basis.rings, used))

@@ -1,7 +1,5 @@
 """Transformations that make correlated noise white, without a matrix over all points."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import Any
 

@@ -236,7 +236,7 @@ class DepartureBasis:
         """Columns of each shape, then of each family: its sensor less the Gaussian, changes."""
         counts = [*(ring.radius.size for ring in self.rings), *(3 for _ in self.families)]
         ends = self.flat + np.cumsum([0, *counts])
-        return tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
+        return tuple(slice(a, b) for a, b in pairwise(ends))
 
     def kernels(self, k: FloatArray) -> FloatArray:
         """Transforms of all columns at ``k`` (rad/m), shape (k, p)."""
@@ -321,7 +321,7 @@ def departure_basis(
     families: tuple[FamilyFit, ...] = ()
     if not isinstance(angular, PlaneDepartures):
         rings = tuple(shape.rings(fit.width, fit.conversion_constant) for shape in SHAPES)
-        families = () if reduced is None else tuple(_fitted_families(reduced))
+        families = tuple(_fitted_families(reduced)) if reduced else ()
     flat = fit.jacobian.shape[1] + (angular.count if angular else 0)
     return DepartureBasis(fit.conversion_constant, fit.sigma, flat, rings, families, angular)
 
@@ -361,8 +361,8 @@ def _fitted_families(reduced: ReducedScan) -> Iterator[FamilyFit]:
         growth = (a * (data @ slope) - b * (data @ signal)) / determinant / amplitudes
         growth = np.clip(growth, -_LONGEST, _LONGEST)
         widths = widths * np.exp(growth)
-        if np.abs(growth).max() < _SETTLED:
+        if abs(growth).max() < _SETTLED:
             break
     for family, width, amplitude in zip(FAMILIES, widths, amplitudes, strict=True):
         if amplitude > 0 and start / _FARTHEST < width < start * _FARTHEST:
-            yield FamilyFit(family, float(amplitude), float(width))
+            yield FamilyFit(family, amplitude, width)

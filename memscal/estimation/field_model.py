@@ -5,8 +5,6 @@ on a grid, and at the points by quintic splines through it; its slopes are the s
 :math:`i k_x \hat U`.  The grid is longer than scan and field, so that nothing wraps around.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cached_property
 from typing import Any, ClassVar, cast
@@ -61,7 +59,7 @@ class FieldModel(ForwardModel):
     def _plane(self) -> _Plane:
         points = self.points
         last = self.k[-1]
-        span = max(float(np.ptp(points.x)), float(np.ptp(points.y)))
+        span = max(np.ptp(points.x), np.ptp(points.y))
         fields = [each.field for each in self.references if isinstance(each, FieldSpectrum)]
         wide = max((max(np.ptp(field.x), np.ptp(field.y)) for field in fields), default=0.0)
         h = max(np.pi / (_OVERSAMPLING * last), points.step / _PER_STEP)
@@ -72,7 +70,7 @@ class FieldModel(ForwardModel):
         # Middle of the grid; a quintic spline through values has these coefficients.
         turn = [np.exp(-0.5j * k * count * h) * 120 for k in (ky, kx)]
         spline = [66 + 52 * np.cos(k * h) + 2 * np.cos(2 * k * h) for k in (ky, kx)]
-        factor = np.multiply.outer(turn[0] / spline[0], turn[1] / spline[1]) / h**2
+        factor = np.outer(turn[0] / spline[0], turn[1] / spline[1]) / h**2
         stress = np.stack([(r.plane(ky, kx) * factor)[cells] for r in self.references])
         return _Plane(count, h, ky[cells[0]], kx[cells[1]], cells, stress)
 
@@ -136,7 +134,7 @@ class FieldModel(ForwardModel):
         places = cast(PlaneGeometry, geometry).places
         values = np.zeros((*places.shape[1:], len(spectra)))
         shape = (plane.count, plane.count)
-        whole = np.zeros((plane.count, plane.count // 2 + 1), dtype=complex)
+        whole = np.zeros((plane.count, plane.count // 2 + 1), complex)
         for scan, stress in enumerate(plane.stress):
             rows = self.points.scan == scan
             for i, spectrum in enumerate(spectra):

@@ -19,6 +19,7 @@ the sensor to the indenter,
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import field
 from functools import cached_property, lru_cache
@@ -62,7 +63,7 @@ def _wave(
     wave: int, r: FloatArray, k: FloatArray, across: bool, below: Sequence[FloatArray] = ()
 ) -> FloatArray:
     """A wave at all products of radii and wavenumbers: cosines and sines where it is a slit's."""
-    x = np.multiply.outer(r, k)
+    x = np.outer(r, k)
     if across:
         return 2 * (np.cos, np.sin)[wave](x) / k
     if wave == TURN:
@@ -92,7 +93,7 @@ def wave_table(wave: int, across: bool, reach: float, nodes: bytes) -> WaveTable
     from scipy.interpolate import make_interp_spline
 
     k = np.frombuffer(nodes)
-    count = int(np.ceil(reach * k[-1] / _TABLE_PHASE)) + 1
+    count = math.ceil(reach * k[-1] / _TABLE_PHASE) + 1
     radii = reach / count * np.arange(-_DEGREE, count + _DEGREE + 1.0)
     lower = range(wave - 2, wave) if wave > 1 else ()
     below = [wave_table(order, across, reach, nodes).values for order in lower]
@@ -156,7 +157,7 @@ class Geometry:
     def _nodes_of(self, spread: FloatArray) -> int:
         """How many first nodes factors need: all, a half, a quarter and so on."""
         # A source with an edge has many waves, of which a wide kernel passes few.
-        size = np.abs(spread)
+        size = abs(spread)
         used = np.flatnonzero(size > _NO_SHARE * size.max())
         needed = 1 + (used[-1] // (spread.size // len(spread)) if used.size else 0)
         halvings = int(np.log2(self.k.size / needed))
@@ -212,8 +213,7 @@ class ForwardModel:
     @cached_property
     def curvature_columns(self) -> FloatArray:
         """Parabola of each scan whose baseline may be curved, shape (n, c)."""
-        inside = np.equal.outer(self.points.scan, self.points.curved)
-        return self.parabola[:, None] * inside
+        return self.parabola[:, None] * np.equal.outer(self.points.scan, self.points.curved)
 
     @cached_property
     def _within(self) -> FloatArray:
@@ -237,7 +237,7 @@ class ForwardModel:
         columns = []
         for inside, free in zip(self.points.inside, self.points.free, strict=True):
             columns += [inside, *(self._within[free] * inside)]
-        return np.stack(columns, axis=1)
+        return np.column_stack(columns)
 
     @cached_property
     def reach(self) -> float:
@@ -259,8 +259,7 @@ class ForwardModel:
         offset = self.offset(centres)
         radius = np.hypot(*offset)
         towards = -offset / np.where(radius > 0, radius, 1.0)
-        across = self.reference.order == ACROSS
-        return Geometry(radius, towards, self.k, across, self.reach)
+        return Geometry(radius, towards, self.k, self.reference.order == ACROSS, self.reach)
 
     def signal(self, geometry: Geometry, kernel: FloatArray) -> FloatArray:
         """Voltages for kernels in V/Pa by their transforms, shape (nodes,) or (nodes, m)."""
@@ -275,15 +274,16 @@ class ForwardModel:
         """Columns (n, b + f): the ``first``, then F; and C (f, nodes): kernels K make F C K."""
         # By singular values: a film transmits few combinations of all waves.  No F and C where
         # there are not more points than columns.
-        if self.points.u.size <= DENSE or not self.sums_waves:
+        points = self.points
+        if points.u.size <= DENSE or not self.sums_waves:
             return np.hstack(first), None
         strongest = np.abs(self._measures).max(axis=0)
         reach = _REACHES * geometry.radius.max() / geometry.reach
-        table = (self.points.order, geometry.across, geometry.reach, self.k.tobytes())
-        size, right, splines = _seen_waves(*table, int(np.ceil(reach)), strongest.tobytes())
+        table = (points.order, geometry.across, geometry.reach, self.k.tobytes())
+        size, right, splines = _seen_waves(*table, math.ceil(reach), strongest.tobytes())
         interpolation = geometry.interpolation(self.k.size)
-        factor = self.points.load
-        if self.points.order:
+        factor = points.load
+        if points.order:
             factor = -factor * geometry.towards[self.axis]
         start = sum(columns.shape[1] for columns in first)
         columns = np.zeros((factor.size, start + size.size * len(self.alike)))
@@ -291,7 +291,7 @@ class ForwardModel:
         np.concatenate(first, axis=1, out=columns[:, :start])
         for scans in self.alike:
             place = slice(start, start + size.size)
-            own_factor = np.where(np.isin(self.points.scan, scans), factor, 0.0)
+            own_factor = np.where(np.isin(points.scan, scans), factor, 0.0)
             for block in slices(factor.size, BLOCK):
                 waves = interpolation[block] @ splines
                 columns[block, place] = waves * own_factor[block, None]
@@ -325,9 +325,9 @@ class ForwardModel:
 
     def by_free_centres(self, shift: FloatArray) -> FloatArray:
         """Derivatives by the free coordinates of all centres (n, m), of those by each point's."""
-        scan = self.points.scan
+        inside = self.points.inside
         free = np.argwhere(self.points.free)
-        return np.stack([np.where(scan == i, shift[axis], 0.0) for i, axis in free], axis=1)
+        return np.column_stack([np.where(inside[i], shift[axis], 0.0) for i, axis in free])
 
     def elliptic(self, geometry: Geometry, ellipses: FloatArray) -> ArrayPair:
         """Responses (m, n) per A to (s, e1, e2), (m, 3); slopes (2, n) of the first by place."""
@@ -336,7 +336,7 @@ class ForwardModel:
         sigma, e1, e2 = ellipses.T
         size = np.hypot(e1, e2)
         tilt = 0.5 * np.arctan2(e2, e1)
-        half = 0.5 * np.multiply.outer(self.k, sigma) ** 2
+        half = 0.5 * np.outer(self.k, sigma) ** 2
         step = np.exp(2j * np.subtract.outer(angle, tilt))
         phasor = np.ones_like(step)
         responses = np.zeros((len(ellipses), angle.size))

@@ -3,8 +3,6 @@
 It is fitted by weighted least squares, with A, centre, baseline and linear drift.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -56,9 +54,9 @@ def gauss_newton(
         root = stretch**-0.5
         # The triangular factor of both stands for them.
         both = triangular(np.column_stack([slope * root[:, None], -residual * root]))
-        whole = np.linalg.lstsq(both[:, :-1], both[:, -1], rcond=None)[0]
-        longest = np.abs(whole).max()
-        step = np.asarray(whole * (_LONGEST_STEP / max(longest, _LONGEST_STEP)), dtype=np.float64)
+        whole = np.linalg.lstsq(both[:, :-1], both[:, -1])[0]
+        longest = abs(whole).max()
+        step = np.asarray(whole * (_LONGEST_STEP / max(longest, _LONGEST_STEP)))
         place = place + step
         cost = loss
         if longest < tolerance:
@@ -78,7 +76,7 @@ def _require_parity(points: ScanPoints, odd: ArrayPair, even: ArrayPair) -> None
     turned = np.min(costs, where=amplitudes < 0, initial=np.inf)
     name = f"u_{points.channel}"
     along = points.channel[0]
-    if float(even[1].min()) < _CLEARLY * min(right, turned):
+    if even[1].min() < _CLEARLY * min(right, turned):
         raise InputError(
             f"{name} is the same on both sides of the sensor.",
             why="A shear changes its sign where the indenter passes the sensor; a normal stress "
@@ -106,8 +104,7 @@ _SOURCE_WIDTHS = 8
 
 def some_points(points: ScanPoints) -> IndexArray:
     """Numbers of the points that are fitted at first, evenly chosen along the scans."""
-    order = np.lexsort((points.x, points.y, points.scan))
-    return np.sort(evenly(order, MOST_AT_START))
+    return np.sort(evenly(np.lexsort((points.x, points.y, points.scan)), MOST_AT_START))
 
 
 def _robust_start(model: ForwardModel, weights: FloatArray) -> FloatArray:
@@ -133,9 +130,8 @@ def _robust_start_of_scan(model: ForwardModel, weights: FloatArray) -> ArrayTrip
     if model.reference.source:
         # A source may be far narrower than G.
         widths = np.geomspace(0.5 * points.step, 0.25 * points.span, _SOURCE_WIDTHS)
-    kernels = gaussian_transfer(model.k[:, None], widths)
     # Profiles per newton of every width, on a table for quick trials.
-    spectra = model.reference.values[:, None] * kernels
+    spectra = model.reference.values[:, None] * gaussian_transfer(model.k[:, None], widths)
     wavenumbers = model.reference.wavenumbers
     tables = wavenumbers.synthesise(spectra, radii, order=model.reference.order).T
     root = np.sqrt(weights)
@@ -153,10 +149,10 @@ def _robust_start_of_scan(model: ForwardModel, weights: FloatArray) -> ArrayTrip
         potentials = wavenumbers.synthesise(spectra / model.k[:, None], radii).T
         even = [np.interp(distances, radii, table) * factors for table in potentials]
         _require_parity(points, (amplitudes, costs), _amplitudes(np.concatenate(even), data, drift))
-    i = int(np.argmin(np.where(amplitudes > 0, costs, np.inf)))
+    i = np.argmin(np.where(amplitudes > 0, costs, np.inf))
     if not amplitudes[i] > 0:
         raise _undetermined(model)
-    baseline = np.linalg.lstsq(drift, data - amplitudes[i] * shapes[i], rcond=None)[0]
+    baseline = np.linalg.lstsq(drift, data - amplitudes[i] * shapes[i])[0]
     shape = np.array([amplitudes[i], widths[i // len(centres)]])
     return shape, centres[i % len(centres)][points.free[0]], baseline
 
@@ -168,7 +164,7 @@ def _amplitudes(shapes: FloatArray, data: FloatArray, drift: FloatArray) -> Arra
     rest = data - base @ (base.T @ data)
     square = np.sum(free**2, axis=1)
     amplitudes = np.divide(free @ rest, square, out=np.zeros_like(square), where=square > 0)
-    return amplitudes, np.abs(rest - amplitudes[:, None] * free).sum(axis=1)
+    return amplitudes, abs(rest - amplitudes[:, None] * free).sum(axis=1)
 
 
 def _trial_centres(model: ForwardModel) -> FloatArray:
@@ -182,7 +178,7 @@ def _trial_centres(model: ForwardModel) -> FloatArray:
         if points.missing:  # at a ceiling, those at the centre
             central = np.union1d(central, np.arange(central[0], central[-1], points.step))
         along[axis] = central[:: int(np.ceil(central.size / (12 if points.planar else 40)))]
-    return np.stack([axis.ravel() for axis in np.meshgrid(*along)], axis=1)
+    return np.column_stack([axis.ravel() for axis in np.meshgrid(*along)])
 
 
 def _smoothing_length(model: ForwardModel) -> float:
@@ -288,7 +284,7 @@ def fit_gaussian_to_points(
         chosen = some_points(model.points)
         some = replace(model, points=model.points.selected(chosen))
         start = fit_gaussian_to_points(some, weights[chosen])
-    theta = _robust_start(model, weights) if start is None else start.theta
+    theta = start.theta if start else _robust_start(model, weights)
     return _solve(model, weights, theta, robust)
 
 
@@ -304,7 +300,7 @@ def _solve(
     begin = start / scale
     fit = linearise(model, begin * scale)
     left = points.standardised(points.u - fit.predicted, weights)
-    noise = robust_scale(left, 1e-12 * float(np.abs(left).max()) + TINY)
+    noise = robust_scale(left, 1e-12 * abs(left).max() + TINY)
     # The solvers ask for residuals and slopes one after the other, at the same place.
     last = {begin.tobytes(): fit}
     prior = points.prior_rows
@@ -381,7 +377,7 @@ def linearise(model: ForwardModel, theta: FloatArray) -> GaussianFit:
         shift = amplitude * shift
     else:
         shift = model.shift_derivative(geometry, amplitude * kernel)
-        both = np.stack([kernel, gaussian_transfer_slope(model.k, sigma)], axis=1)
+        both = np.column_stack([kernel, gaussian_transfer_slope(model.k, sigma)])
         columns = model.signal(geometry, both)
     signal = columns[:, :1]
     by_shape = amplitude * columns[:, 1 : 2 + points.ellipse]

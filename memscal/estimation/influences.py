@@ -7,8 +7,6 @@ its base carries :math:`T = 2(\sinh x + x\cosh x)/(\sinh 2x + 2x)`, x = kh, of a
 Fourier Transforms, 1951), in place of what a bonded one does.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace
@@ -56,7 +54,7 @@ def influences(scans: Sequence[Scan], estimate: ProfileEstimate) -> dict[str, In
     found = {
         "stage_scale": Influence(slope * estimate.distance),
         "baseline_curvature": Influence(largest * model.parabola),
-        "gain_curvature": Influence(-signal * np.abs(signal) / largest),
+        "gain_curvature": Influence(-signal * abs(signal) / largest),
         "load_scale": Influence(np.zeros_like(signal), scaling=1.0),
     }
     if estimate.points.order:

@@ -53,17 +53,17 @@ def hold_out(estimate: ProfileEstimate, group: IndexArray) -> HeldOut | None:
     model = residuals.free_model(estimate, clip_outliers=True)
     # Centre, baseline and drift are fitted to a held-out group by itself.
     nuisances = slice(2, estimate.points.centres.stop + estimate.model.straight_columns.shape[1])
-    count = int(group.max()) + 1
+    count = group.max() + 1
     # Of too many groups, neighbouring ones are joined.
     fold = (group * min(count, _MOST_FOLDS) // count)[model.point]
     # The triangular factors of each fold's design and data stand for them.
     both = np.column_stack([model.design, model.data])
-    roots = {int(i): triangular(both[fold == i]) for i in np.unique(fold)}
+    roots = {i: triangular(both[fold == i]) for i in np.unique(fold)}
     sizes = np.bincount(fold)
     ratios = {}
     for i in roots:
-        ratio = _predict(model.stated, roots, sizes, i, nuisances)
-        if ratio is not None:
+        ratio = _predict(estimate.points.noise_stated, roots, sizes, i, nuisances)
+        if ratio:
             ratios[i] = ratio
     folds = len(ratios)
     if folds < 2:
@@ -83,11 +83,11 @@ def _predict(
     # What a fold alone determines is zero in the others but for rounding.
     size = np.linalg.norm(both[:, :-1], axis=0)
     others, rank = _left_over(rest, size)
-    others_degrees = int(sizes.sum() - sizes[out]) - rank
+    others_degrees = sizes.sum() - sizes[out] - rank
     own_nuisances = both[:, nuisances].copy()
     own_nuisances[: len(rest)] = 0.0
     left, rank = _left_over(np.hstack([own_nuisances, both]), np.append(size[nuisances], size))
-    degrees = int(sizes.sum()) - rank - others_degrees
+    degrees = sizes.sum() - rank - others_degrees
     if degrees < FEWEST_RESIDUALS or others_degrees < FEWEST_RESIDUALS:
         return None
     value = max(left - others, 0.0) / degrees
@@ -146,7 +146,7 @@ def _widened(estimate: ProfileEstimate, factors: tuple[float, ...]) -> FloatArra
 def _add(estimate: ProfileEstimate, columns: FloatArray) -> ExtraColumns:
     """Fit the columns together with a round Gaussian, the departures subtracted as estimated."""
     weights = estimate.weights / estimate.noise_scale**2
-    scale = np.abs(columns).max(axis=0)
+    scale = abs(columns).max(axis=0)
     columns = columns / scale
     jacobian = estimate.gaussian.jacobian
     count = jacobian.shape[1] - estimate.points.ellipse
@@ -156,9 +156,9 @@ def _add(estimate: ProfileEstimate, columns: FloatArray) -> ExtraColumns:
     root = triangular(estimate.points.standardised(np.hstack([gaussian, columns, left]), weights))
     free = root[count:, count:-1]
     residual = root[count:, -1]
-    coefficients = np.linalg.lstsq(free, residual, rcond=None)[0]
+    coefficients = np.linalg.lstsq(free, residual)[0]
     fall = float(residual @ free @ coefficients)
-    size = float(np.abs(columns @ coefficients).max() / estimate.largest_signal)
+    size = abs(columns @ coefficients).max() / estimate.largest_signal
     return ExtraColumns(fall, columns.shape[1], coefficients / scale, size)
 
 
@@ -183,7 +183,7 @@ _ENOUGH = 10_000
 
 def clipped_points(estimate: ProfileEstimate) -> BoolArray:
     """Say which points were held at a ceiling, shape (n,), of a channel that is no shear."""
-    clipped = np.zeros(estimate.points.u.size, dtype=np.bool_)
+    clipped = np.zeros(estimate.points.u.size, bool)
     for inside in estimate.points.inside:
         agreeing, top = _agreeing(estimate, inside)
         for flat in (agreeing, _plateau(estimate, inside)):
@@ -228,7 +228,7 @@ def _risen_above(estimate: ProfileEstimate, plateau: BoolArray) -> bool:
         outlier = np.ones_like(outlier)
     weights = np.where(plateau, _LITTLE, outlier / estimate.outlier_weight) * estimate.weights
     chosen = np.arange(plateau.size)
-    if plateau.size > 2 * _ENOUGH and points.decorrelation is None:
+    if plateau.size > 2 * _ENOUGH and not points.decorrelation:
         # Some of the plateau, and of the others.
         some = evenly(np.flatnonzero(plateau), _ENOUGH)
         others = evenly(np.flatnonzero(~plateau), _ENOUGH)
@@ -243,7 +243,7 @@ def _risen_above(estimate: ProfileEstimate, plateau: BoolArray) -> bool:
     reduced = ReducedScan.of(model, fit, weights, angular.components if angular else None)
     basis = departure_basis(fit, reduced, angular)
     count = (outlier * ~plateau)[chosen].sum()
-    least = 1.0 if points.u_errors is not None else NUMERICAL_FLOOR * estimate.largest_signal
+    least = 1.0 if points.noise_stated else NUMERICAL_FLOOR * estimate.largest_signal
     weighed = weigh_departures(reduced, basis, count, least_noise=least).average()
     # Mean over the plateau of the prediction less the voltage, and its standard uncertainty.
     share = plateau[chosen] / plateau[chosen].sum()
@@ -260,14 +260,14 @@ def _plateau(estimate: ProfileEstimate, inside: BoolArray) -> BoolArray:
     u = estimate.points.u[order]
     plateau = np.zeros_like(inside)
     # Scatter about the mean of the first points, for every number of them.
-    half = int(inside.sum()) // 2
+    half = inside.sum() // 2
     weight = estimate.noise[order][:half] ** -2
     offset = u[:half] - u[:1]
     total, first, second = (np.cumsum(weight * offset**power) for power in range(3))
     scatter = second - first**2 / total
     count = np.arange(1, half + 1)
     beyond = (scatter > chdtri(np.maximum(count - 1, 1), _ALIKE)) & (count >= FEWEST_AT_CEILING)
-    last = int(np.argmax(beyond)) if beyond.any() else half - 1
+    last = np.argmax(beyond) if beyond.any() else half - 1
     if last >= FEWEST_AT_CEILING:
         plateau[order[:last]] = True
     return plateau

@@ -1,7 +1,5 @@
 """Outliers and noise of a scan's points by their residuals: robust scales, weights, neighbours."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -26,7 +24,7 @@ _NORMAL = 1.4826
 
 def robust_scale(values: FloatArray, least: float) -> float:
     """Standard deviation of a normal distribution by the median absolute value, no less."""
-    return max(_NORMAL * float(np.median(np.abs(values))), least)
+    return max(_NORMAL * float(np.median(abs(values))), least)
 
 
 def point_weights(
@@ -37,14 +35,14 @@ def point_weights(
     # in robust standard deviations of their own, of ``least`` or more; on a raster in those of
     # their neighbours where these are larger.
     root = np.sqrt(stated)
-    least = _MODEL * float(np.abs(points.u).max() * np.sqrt(np.median(stated)))
+    least = _MODEL * (abs(points.u).max() * np.sqrt(np.median(stated)))
     standardised = residual * root
     scale: FloatArray | float = robust_scale(standardised, least)
     if points.planar:
         standardised = isolated(points, residual) * root
         # Errors of the stage make more noise where the voltage is steep.
-        scale = np.maximum(scale, _NORMAL * median_nearby(points, np.abs(standardised)))
-    z = np.abs(standardised) / scale
+        scale = np.maximum(scale, _NORMAL * median_nearby(points, abs(standardised)))
+    z = abs(standardised) / scale
     return np.minimum(1.0, (threshold / np.maximum(z, threshold)) ** 4)
 
 
@@ -61,7 +59,7 @@ def raster_noise(
     """Noise of one reading by its repeats, or by third differences of residuals (n,) in V."""
     # Both leave out what is smooth over the plane: a sensor that is not round adds nothing; and
     # points of little ``outlier`` weight.  ``None`` where noise is stated, or of too few of either.
-    if points.u_errors is not None or not points.planar:
+    if points.noise_stated or not points.planar:
         return None
     ordinary = np.flatnonzero(outlier >= OUTLIER_WEIGHT)
     group = grouped(points.scan, points.place_numbers("index"), points.load)[ordinary]
@@ -78,7 +76,7 @@ def raster_noise(
     square = np.sum((differences @ residual) ** 2)
     # Differences that share readings are correlated (Satterthwaite, Biometrics Bull. 2, 1946).
     degrees = count**2 / (differences @ differences.T).power(2).sum()
-    return RasterNoise(float(np.sqrt(square / count)), float(degrees))
+    return RasterNoise(np.sqrt(square / count), degrees)
 
 
 def variances_nearby(points: ScanPoints, residual: FloatArray) -> FloatArray:

@@ -68,7 +68,7 @@ class Spots:
         axis = step * np.arange(-half, half + 1)
         lattice = np.stack(np.meshgrid(axis, axis), axis=-1)
         used = _ellipses(fit, lattice) < _CUT
-        count = int(used.sum())
+        count = used.sum()
         every = cls(axis, used, _BLUR * step, np.eye(count))
         volts = fit.points.standardised(every.signal(model, fit.centre), weights)
         square, vectors = np.linalg.eigh(volts.T @ volts)
@@ -101,13 +101,13 @@ class Spots:
             for place in (y, x)
         )
         planes = rows @ np.moveaxis(lattice, 2, 0) @ (columns.T / (2 * np.pi * self.width**2))
-        return np.asarray(planes.reshape(len(planes), -1).T)
+        return planes.reshape(len(planes), -1).T
 
 
 def _moments(fit: GaussianFit) -> FloatArray:
     """Second moments of the Gaussian, in m^2."""
     e1, e2 = bounded(fit.ellipticity)
-    return np.asarray(fit.width**2 * np.array([[1 + e1, e2], [e2, 1 - e1]]))
+    return fit.width**2 * np.array([[1 + e1, e2], [e2, 1 - e1]])
 
 
 def _ellipses(fit: GaussianFit, places: FloatArray) -> FloatArray:
@@ -198,10 +198,10 @@ def _expected_covariance(
         for envelope, length, smooth in product(envelopes, _LENGTHS, (0, 1)):
             far = np.sqrt(1 + 4 * smooth) * apart / length
             form = (1 + smooth * (far + far**2 / 3)) * np.exp(-far)
-            covariance = form * np.multiply.outer(envelope, envelope)
+            covariance = form * np.outer(envelope, envelope)
             covariances.append(covariance * (fit.size**2 / np.sum(covariance * overlap)))
             variance, turn = np.linalg.eigh(seen @ covariances[-1] @ seen.T)
-            growth = 1 + np.multiply.outer(_STRENGTHS**2, np.maximum(variance, 0.0))
+            growth = 1 + np.outer(_STRENGTHS**2, np.maximum(variance, 0.0))
             logs.append(-0.5 * np.sum(np.log(growth) + (turn.T @ data) ** 2 / growth, axis=1))
         share = np.exp(np.array(logs) - logsumexp(logs)) @ _STRENGTHS**2
         expected = np.tensordot(share, covariances, 1)
@@ -210,4 +210,4 @@ def _expected_covariance(
         gain = np.linalg.solve(seen @ by_data + np.eye(len(seen)), by_data.T).T
         growth = (near @ (gain @ data) ** 2) / (near @ np.sum(gain * by_data, axis=1))
         envelopes = [np.sqrt(np.diag(expected) * growth)]
-    return np.asarray(expected)
+    return expected

@@ -134,6 +134,11 @@ class ScanPoints:
         return channel_order(self.channel)
 
     @property
+    def noise_stated(self) -> bool:
+        """Whether the voltages state their noise."""
+        return self.u_errors is not None
+
+    @property
     def positions(self) -> FloatArray:
         """Positions of the indenter along x and y, shape (2, n), in m."""
         return np.stack([self.x, self.y])
@@ -168,7 +173,7 @@ class ScanPoints:
     @property
     def centres(self) -> slice:
         """Places of the free centres among the parameters of a Gaussian fit."""
-        return slice(2, 2 + int(self.free.sum()))
+        return slice(2, 2 + self.free.sum())
 
     @property
     def curvatures(self) -> slice:
@@ -196,7 +201,7 @@ class ScanPoints:
 
     def place_numbers(self, name: str) -> IndexArray:
         """Return ``index``, ``row`` or ``readings`` of the places for all points, shape (n,)."""
-        values = np.empty(self.u.size, dtype=np.intp)
+        values = np.empty(self.u.size, np.intp)
         for scan, places in enumerate(self.places):
             values[self.scan == scan] = getattr(places, name)
         return values
@@ -238,10 +243,11 @@ class ScanPoints:
 
     def selected(self, chosen: IndexArray) -> ScanPoints:
         """Return some of the points, without their correlations."""
-        columns: dict[str, Any] = {}
-        for name, value in vars(self).items():
-            if isinstance(value, np.ndarray) and name not in ("free", "averaging", "curvature"):
-                columns[name] = value[chosen]
+        columns: dict[str, Any] = {
+            name: value[chosen]
+            for name, value in vars(self).items()
+            if isinstance(value, np.ndarray) and name not in ("free", "averaging", "curvature")
+        }
         return replace(self, **columns, decorrelation=None)
 
     def standardised(
@@ -250,7 +256,7 @@ class ScanPoints:
         """Scale rows, (n,) or (n, m), by the root of their weights, and decorrelate them."""
         place = None if out is None else out.T
         scaled: FloatArray = np.multiply(values.T, np.sqrt(weights), out=place).T
-        return scaled if self.decorrelation is None else self.decorrelation.apply(scaled)
+        return self.decorrelation.apply(scaled) if self.decorrelation else scaled
 
     def sharing(self, changes: FloatArray) -> tuple[ScanPoints, float]:
         """Return the points with further errors in common, and what these add to ln det.
@@ -261,7 +267,7 @@ class ScanPoints:
         left, singular, _ = np.linalg.svd(changes, full_matrices=False)
         factor = self.decorrelation or Decorrelation(())
         factor = replace(factor, common=(*factor.common, (left, np.hypot(1, singular))))
-        return replace(self, decorrelation=factor), float(np.log1p(singular**2).sum())
+        return replace(self, decorrelation=factor), np.log1p(singular**2).sum()
 
     def sharing_positions(self, moved: FloatArray, stated: FloatArray) -> ScanPoints:
         """Return the points with the errors of their positions in common to repeats.
@@ -273,17 +279,17 @@ class ScanPoints:
         place = grouped(self.owner, self.anew * self.repeat, self.y, self.x)
         share = moved * np.sqrt(stated)
         share[np.bincount(place)[place] == 1] = 0.0
-        if self.u_errors is None or not share.any():
+        if not (self.noise_stated and share.any()):
             return self
         # The variance counts all errors: what is a reading's own is left of it.
         own = np.sqrt(1 - share**2)
         every = np.arange(place.size)
         known = self.decorrelation
-        root = own[None] if known is None else own[:, None] * known.correlate(np.eye(every.size))
+        root = own[:, None] * known.correlate(np.eye(every.size)) if known else own[None]
         points = replace(self, decorrelation=Decorrelation(((every, root),)))
         columns = csr_array((share, (every, place)))
-        if known is not None:
-            assert points.decorrelation is not None
+        if known:
+            assert points.decorrelation
             return points.sharing(points.decorrelation.apply(columns.toarray()))[0]
         # No reading has two positions: the columns are orthogonal.
         square = np.bincount(place, (share / own) ** 2)
@@ -294,7 +300,7 @@ class ScanPoints:
 
     def unstandardise(self, columns: FloatArray, weights: FloatArray) -> FloatArray:
         """Apply the transposed standardisation to columns (n, m), which are overwritten."""
-        if self.decorrelation is not None:
+        if self.decorrelation:
             columns = self.decorrelation.adjoint(columns)
         columns *= np.sqrt(weights)[:, None]
         return columns
@@ -321,9 +327,9 @@ def measured_points(scan: Scan, channel: str = "zz") -> ScanPoints:
     x_errors = 0.0 if scan.x_errors is None else scan.x_errors
     branch = np.zeros(u.shape, np.int64) if scan.branch is None else scan.branch
     correlation = None if channel_order(channel) else scan.u_zz_correlation
-    count = int(keep.sum())
+    count = keep.sum()
     along = [scan.direction == "x", scan.direction == "y"]
-    first = np.zeros(count, dtype=np.intp)
+    first = np.zeros(count, np.intp)
     points = ScanPoints(
         x=x[keep],
         y=y[keep],
@@ -357,8 +363,8 @@ def calibration_points(scan: Scan, channel: str = "zz") -> ScanPoints:
     points = measured_points(scan, channel)
     relative = scan.baseline_curvature_uncertainty
     # The median of three points does not follow a single outlier.
-    rise = np.sort(np.abs(rise_of(points.x, points.y, points.u)))
-    deviation = float(np.median(rise[-3:])) * (CURVATURE if relative is None else relative)
+    rise = np.sort(abs(rise_of(points.x, points.y, points.u)))
+    deviation = np.median(rise[-3:]) * (CURVATURE if relative is None else relative)
     return replace(points, curvature=np.array([deviation]))
 
 
@@ -462,7 +468,7 @@ def joined_points(scans: Sequence[ScanPoints], owners: Sequence[int] | None = No
             cure="State it in every scan, or leave it out of every one.",
         )
     number = np.repeat(np.arange(len(scans)), [points.u.size for points in scans])
-    before = np.cumsum([0, *(int(points.repeat.max()) + 1 for points in scans)])
+    before = np.cumsum([0, *(points.repeat.max() + 1 for points in scans)])
     own = ("free", "averaging", "curvature")
     names = ("x", "y", "u", "load", "x_errors", "branch", "anew", "repeat", *own)
     columns = {name: np.concatenate([getattr(each, name) for each in scans]) for name in names}
@@ -506,17 +512,17 @@ def _decorrelation(correlation: FloatArray, keep: BoolArray) -> Decorrelation:
 def ordinary_readings(points: ScanPoints) -> BoolArray:
     """Say which readings (n,) are not among a few that lie far beyond all others of their scan."""
     # A converter's sentinel would draw amplitude and baseline to itself, above all at an end.
-    ordinary = np.ones(points.u.size, dtype=np.bool_)
+    ordinary = np.ones(points.u.size, bool)
     share = _FEW_OF_RASTER if points.planar else _FEW_OF_LINE
     for inside in points.inside:
         rows = np.flatnonzero(inside)
-        distance = np.abs(points.u[rows] - np.median(points.u[rows]))
+        distance = abs(points.u[rows] - np.median(points.u[rows]))
         order = np.argsort(distance)
         few = max(int(share * rows.size), 1)
         farthest = distance[order[-few - 1 :]]
         beyond = farthest[1:] > _WILD * farthest[:-1]
         if beyond.any():
-            ordinary[rows[order[int(np.argmax(beyond)) - few :]]] = False
+            ordinary[rows[order[np.argmax(beyond) - few :]]] = False
     return ordinary
 
 
@@ -551,7 +557,7 @@ def _last_digit(u: FloatArray) -> float:
     least = steps.min(initial=np.inf)
     for digits in range(1, _MOST_DIGITS + 1):
         number = digits * steps / least
-        if np.abs(number - np.rint(number)).max(initial=0.0) < _WHOLE:
+        if abs(number - np.rint(number)).max(initial=0.0) < _WHOLE:
             return float(least) / digits
     return 0.0
 
@@ -612,4 +618,4 @@ def across(correlation: FloatArray, group: IndexArray) -> bool:
     if not is_banded(correlation):
         return bool(correlation[np.not_equal.outer(group, group)].any())
     columns = range(1, correlation.shape[1])
-    return any(bool(correlation[:-j, j][group[j:] != group[:-j]].any()) for j in columns)
+    return any(correlation[:-j, j][group[j:] != group[:-j]].any() for j in columns)

@@ -141,10 +141,10 @@ class ProfileEstimate:
 
     def adopted_noise(self, scatter: float) -> float:
         """Noise of a point of weight one: stated uncertainties are adopted until exceeded."""
-        if self.raster_noise is not None:
+        if self.raster_noise:
             scatter = self.raster_noise.deviation
         scatter = max(scatter, NUMERICAL_FLOOR * self.largest_signal)
-        return max(scatter, 1.0) if self.points.u_errors is not None else scatter
+        return max(scatter, 1.0) if self.points.noise_stated else scatter
 
     @cached_property
     def kernel(self) -> FloatArray:
@@ -258,7 +258,7 @@ class ProfileEstimate:
     @property
     def largest_signal(self) -> float:
         """Largest voltage above the background, in V."""
-        return float(np.abs(self.signal).max())
+        return float(abs(self.signal).max())
 
 
 def _root(numbers: VoltageMap, noise: FloatArray, factor: Decorrelation | None) -> FloatArray:
@@ -266,7 +266,7 @@ def _root(numbers: VoltageMap, noise: FloatArray, factor: Decorrelation | None) 
     if noise.size > DENSE:
         return square_root(numbers.covariance(noise, factor))
     scaled = noise * numbers.dense()
-    return scaled if factor is None else factor.correlate_adjoint(scaled.T).T
+    return factor.correlate_adjoint(scaled.T).T if factor else scaled
 
 
 def estimate_profile(
@@ -343,7 +343,7 @@ def _estimated(
         # The noise of the voltages alone: a curvature beyond its prior is none.
         left = points.standardised(residual, weights)
         freedom = max(count - fit.jacobian.shape[1], 1.0)
-        unit = max(float(np.sqrt(left @ left / freedom)), noise)
+        unit = max(np.sqrt(left @ left / freedom), noise)
         # A residual counts by the root of its weight.
         weighed_alike = np.allclose(updated**0.5, outlier**0.5, atol=0.02)
         # By the noise the prior of a curvature is weighed.
@@ -391,17 +391,17 @@ def _weighed(
     free = plane_departures(spots, fit, (reduced.data, reduced.flat, reduced.components), noise)
     free_basis = departure_basis(fit, reduced, free)
     free_weighing = bayesian.weigh_departures(reduced, free_basis, **noises)
-    if free_weighing.evidence < about_centre.evidence + _CLEARLY:
-        return basis, about_centre.average()
-    weighed = free_weighing.average()
-    # Noise that grows with the signal, as by errors of the stage, would be taken for G.
-    left = fit.points.standardised(weighed.residual, weights)
-    signal = fit.jacobian[:, 0]
-    variance = variances_nearby(fit.points, left)[signal > _SEEN * signal.max()].mean()
-    if variance > _EVEN * noise**2:
-        return basis, about_centre.average()
-    found = about_centre.log_marginals
-    return free_basis, replace(weighed, log_marginals=found, free=free_weighing.evidence)
+    if free_weighing.evidence >= about_centre.evidence + _CLEARLY:
+        weighed = free_weighing.average()
+        # Noise that grows with the signal, as by errors of the stage, would be taken for G.
+        left = fit.points.standardised(weighed.residual, weights)
+        signal = fit.jacobian[:, 0]
+        variance = variances_nearby(fit.points, left)[signal > _SEEN * signal.max()].mean()
+        if variance <= _EVEN * noise**2:
+            return free_basis, replace(
+                weighed, log_marginals=about_centre.log_marginals, free=free_weighing.evidence
+            )
+    return basis, about_centre.average()
 
 
 def log_marginal_likelihood(
@@ -424,7 +424,7 @@ def log_marginal_likelihood(
     reduced = ReducedScan.of(model, fit, weights, angular.components if angular else None)
     basis = departure_basis(fit, reduced, angular)
     least = _least_noise(fit)
-    if estimate.raster_noise is not None:
+    if estimate.raster_noise:
         least = max(least, estimate.raster_noise.deviation)
     count = estimate.outlier_weight.sum()
     weighing = bayesian.weigh_departures(reduced, basis, count, least_noise=least)
@@ -439,8 +439,8 @@ def gaussian_log_marginal(estimate: ProfileEstimate, fit: GaussianFit) -> float:
     # The prior of a curvature is a further reading.
     _, prior = fit.prior
     left = np.append(fit.points.standardised(fit.points.u - fit.predicted, weights), prior)
-    freedom = float(estimate.outlier_weight.sum()) + prior.size - fit.jacobian.shape[1]
-    variance = max(float(left @ left) / freedom, _least_noise(fit) ** 2)
+    freedom = estimate.outlier_weight.sum() + prior.size - fit.jacobian.shape[1]
+    variance = max(left @ left / freedom, _least_noise(fit) ** 2)
     loss = freedom * math.log(variance) + left @ left / variance
     # The flat priors are of ln A and ln(width).
     _, volume = np.linalg.slogdet(fit.covariance(weights, 1.0))
@@ -449,9 +449,9 @@ def gaussian_log_marginal(estimate: ProfileEstimate, fit: GaussianFit) -> float:
 
 def _least_noise(fit: GaussianFit) -> float:
     """Least noise of a point of weight one: as stated, or beyond rounding (V)."""
-    if fit.points.u_errors is not None:
+    if fit.points.noise_stated:
         return 1.0
-    return NUMERICAL_FLOOR * float(np.abs(fit.predicted).max())
+    return NUMERICAL_FLOOR * float(abs(fit.predicted).max())
 
 
 def stated_weights(points: ScanPoints, position_noise: float | FloatArray = 0.0) -> FloatArray:
@@ -518,13 +518,13 @@ def _why_undetermined(estimate: ProfileEstimate, *, shown: bool) -> str:
     # ``shown``: whether noise and baseline alone would leave it distinct from zero.
     base = np.linalg.qr(estimate.model.straight_columns)[0]
     rise = np.ptp(estimate.predicted - base @ (base.T @ estimate.predicted))
-    ratio = rise / float(np.median(estimate.noise))
+    ratio = rise / np.median(estimate.noise)
     varied = estimate.points.reading.text(rise)
     varies = f"Beside a line the voltage varies by {varied}, {ratio:.3g} times its noise"
     if ratio < _LEAST_RISE:
         return f"{varies}: it does not rise above its noise as the indenter passes."
-    signal = np.abs(estimate.signal)
-    farthest = int(np.argmax(estimate.distance))
+    signal = abs(estimate.signal)
+    farthest = np.argmax(estimate.distance)
     left = signal[farthest] / signal.max()
     if left > _LEFT:
         return (
@@ -543,7 +543,7 @@ def _why_undetermined(estimate: ProfileEstimate, *, shown: bool) -> str:
     blocks = {
         "the baseline: the scan is too short to show the profile's tail": everything[centres:flat],
         "the width and shape of the apparatus function: the reference is too wide, or the step too "
-        "coarse, to determine them": np.concatenate([[1], everything[flat:]]),
+        "coarse, to determine them": np.append(1, everything[flat:]),
     }
     confused = max(blocks, key=lambda name: _share(estimate, blocks[name]))
     return f"{varies}, but the conversion constant cannot be told from {confused}."
@@ -577,7 +577,7 @@ def constrained_profile(
         # A profile that falls all the way to zero is nowhere negative.
         profile = np.append(profile[:-1] - profile[1:], profile[-1])
         columns = np.vstack([columns[:-1] - columns[1:], columns[-1:]])
-    scale = np.abs(profile).max()
+    scale = abs(profile).max()
     root = square_root(estimate.weighed.covariance)
     z = _least_distance(columns @ root / scale, -profile / scale - _SLACK)
     weighed = replace(estimate.weighed, mean=estimate.weighed.mean + root @ z)

@@ -78,14 +78,15 @@ def reference_spectra(
 
 
 def _spectrum(stress: BaseStress, wavenumbers: Wavenumbers, points: ScanPoints) -> RadialSpectrum:
+    order = points.order
     if isinstance(stress, Contact):
-        values = _base_spectrum(stress, wavenumbers.k.tobytes(), points.order) / stress.load
-        return RadialSpectrum(wavenumbers, values, points.order)
-    if stress.form is None or points.order:
-        values = _table_spectrum(stress, wavenumbers.k, points.span, points.order)
-        return RadialSpectrum(wavenumbers, values, points.order)
+        values = _base_spectrum(stress, wavenumbers.k.tobytes(), order) / stress.load
+        return RadialSpectrum(wavenumbers, values, order)
+    if not stress.form or order:
+        values = _table_spectrum(stress, wavenumbers.k, points.span, order)
+        return RadialSpectrum(wavenumbers, values, order)
     values = stress.form.transform(wavenumbers.k) / stress.load
-    if stress.ideal is not None and stress.ideal.shape == "slit":
+    if stress.ideal and stress.ideal.shape == "slit":
         if points.planar:
             raise InputError(
                 "A slit is the reference of a raster.",
@@ -95,7 +96,7 @@ def _spectrum(stress: BaseStress, wavenumbers: Wavenumbers, points: ScanPoints) 
         return RadialSpectrum(wavenumbers, values, ACROSS, source=True)
     # What a scan samples of a field is looked at.
     seen = np.linspace(0.0, min(np.pi / points.step, wavenumbers.k[-1]), _SEEN)[1:]
-    if stress.field is None or stress.field.unevenness(seen) < _ROUND:
+    if not stress.field or stress.field.unevenness(seen) < _ROUND:
         return RadialSpectrum(wavenumbers, values, source=True)
     from memscal.estimation.field_model import FieldSpectrum
 
@@ -109,11 +110,11 @@ def _last_wavenumber(reference: BaseStress, points: ScanPoints) -> float:
     form = reference.form
     width = 0.5 * points.step
     last = _PASSED / width
-    if form is not None:
+    if form:
         last = _PASSED_OF_SOURCE / max(width, _narrowest_kernel(reference, points))
     k = np.linspace(0.0, last, _WAVENUMBERS)[1:]
     values = form.transform(k) if form else hankel_transform(reference.r, reference.sigma_zz, k)
-    size = np.abs(values)
+    size = abs(values)
     return float(k[size > _NOTHING * size.max()][-1])
 
 
@@ -142,7 +143,7 @@ def _table_spectrum(reference: StressProfile, k: FloatArray, span: float, order:
             "COLUMN), or leave it out to have the rod solved.",
         )
     needed = span / 2
-    tail = abs(stress[-1]) / np.abs(stress).max()
+    tail = abs(stress[-1]) / abs(stress).max()
     if reference.r[-1] < needed and tail > _DECAYED:
         raise InputError(
             f"The reference ends at r = {reference.r[-1] * 1e3:.4g} mm with {tail:.1%} of its "
@@ -158,7 +159,7 @@ def _table_spectrum(reference: StressProfile, k: FloatArray, span: float, order:
         )
     values = hankel_transform(reference.r, stress, k, order=order) / reference.load
     # Most of a shear, whatever the film, holds the film back.
-    if order and values[np.argmax(np.abs(values))] > 0:
+    if order and values[np.argmax(abs(values))] > 0:
         raise InputError(
             "The shear of the reference pulls the film outward.",
             why="sigma_rz is the traction of the base on the film, positive outward: a film that "
@@ -199,7 +200,7 @@ def reference_sensitivities(
     changes: dict[str, list[FloatArray]] = {}
     todo = list(product((*_STATED, "law"), range(len(scans))))
     for owner, i in Task("uncertain inputs", len(todo)).counted(todo):
-        if scans[i].film is None:
+        if not scans[i].film:
             continue
         # Scans share the error of a common film or rod, and that of the film's law.
         owners = [getattr(scan, owner, None) for scan in scans]

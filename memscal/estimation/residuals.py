@@ -42,7 +42,6 @@ class FreeModel:
     data: FloatArray
     design: FloatArray  # (m, r): weighted columns of the flat parameters, then of the departures
     point: IndexArray  # (m,): which points of the scan they are
-    stated: bool  # whether the noise is stated
 
     @cached_property
     def basis(self) -> FloatArray:
@@ -94,13 +93,13 @@ def free_model(estimate: ProfileEstimate, *, clip_outliers: bool = False) -> Fre
     rings = np.hstack([around, rings @ mixed])
     base = np.linalg.qr(flat)[0]
     left, singular, _ = np.linalg.svd(rings - base @ (base.T @ rings), full_matrices=False)
-    stated = points.u_errors is not None
-    resolved = singular > _SHARE_OF_NOISE * (1.0 if stated else estimate.noise_scale)
+    noise = 1.0 if points.noise_stated else estimate.noise_scale
+    resolved = singular > _SHARE_OF_NOISE * noise
     design = np.hstack([flat, left[:, resolved] * singular[resolved]])
     design = q @ design
     del q
     design = design if ordinary.all() else design[point]
-    return FreeModel(data, design, point, stated)
+    return FreeModel(data, design, point)
 
 
 #: Weight of the correlation from one step to the next: half as much for each step farther.
@@ -156,8 +155,9 @@ def residuals_of(estimate: ProfileEstimate, model: FreeModel | None = None) -> R
     point = model.point[order]
     basis = model.basis[order]
     values = model.left_over[order]
-    degrees = basis.shape[0] - basis.shape[1]
-    return Residuals(values, basis, point, place[point], sequence[point], model.stated, degrees)
+    degrees = len(basis) - basis.shape[1]
+    stated = points.noise_stated
+    return Residuals(values, basis, point, place[point], sequence[point], stated, degrees)
 
 
 def chi_square_test(residuals: Residuals) -> TestOutcome:
@@ -174,14 +174,14 @@ def pure_error_test(estimate: ProfileEstimate, model: FreeModel) -> TestOutcome 
     points = estimate.points
     keys = (points.scan, points.place_numbers("index"), points.load)
     group = grouped(*(key[model.point] for key in keys))
-    if points.decorrelation is not None or group.max() + 1 == group.size:
+    if points.decorrelation or group.max() + 1 == group.size:
         return None
     weight = np.sqrt(estimate.weights / estimate.outlier_weight)[model.point]
     square = np.bincount(group, weight**2)
 
     def within(columns: FloatArray) -> FloatArray:
         """Subtract from each column its weighted mean at each place."""
-        sums = np.stack([np.bincount(group, weight * c) for c in columns.T], axis=1)
+        sums = np.column_stack([np.bincount(group, weight * c) for c in columns.T])
         return columns - weight[:, None] * (sums / square[:, None])[group]
 
     moved = within(model.basis)
@@ -190,9 +190,9 @@ def pure_error_test(estimate: ProfileEstimate, model: FreeModel) -> TestOutcome 
     near = moved @ (right[apart].T / singular[apart])
     scatter = within(model.data[:, None])[:, 0]
     scatter -= near @ (near.T @ scatter)
-    pure = float(scatter @ scatter)
-    pure_degrees = group.size - int(group.max()) - 1 - near.shape[1]
-    misfit = max(float(model.left_over @ model.left_over) - pure, 0.0)
+    pure = scatter @ scatter
+    pure_degrees = group.size - group.max() - 1 - near.shape[1]
+    misfit = max(model.left_over @ model.left_over - pure, 0.0)
     degrees = group.size - model.basis.shape[1] - pure_degrees
     if degrees < FEWEST_RESIDUALS or pure_degrees < FEWEST_RESIDUALS or pure == 0.0:
         return None
@@ -205,14 +205,14 @@ def ring_test(
     """Test a raster's residuals (n,) in rings of wavenumbers against noise known by ``rest``."""
     # In a ring of n components the power is chi-square of n degrees, F where the noise is
     # estimated; the least likely of several rings by Bonferroni.
-    plane = np.zeros([int(np.ptp(i)) + 1 for i in index])
+    plane = np.zeros([np.ptp(i) + 1 for i in index])
     np.add.at(plane, tuple(i - i.min() for i in index), left)
-    power = np.abs(np.fft.fft2(plane)) ** 2 / (noise @ noise)
+    power = abs(np.fft.fft2(plane)) ** 2 / (noise @ noise)
     cycles = [np.fft.fftfreq(count) * max(plane.shape) for count in plane.shape]
     ring = np.rint(np.hypot.outer(*cycles)).astype(np.intp).ravel()
     count = np.bincount(ring)
     ratio = np.bincount(ring, power.ravel()) / count / _NEGLIGIBLE
-    worst = int(np.argmax(ratio / fdtri(count, rest, 1 - FALSE_ALARM / count.size)))
+    worst = np.argmax(ratio / fdtri(count, rest, 1 - FALSE_ALARM / count.size))
     return ratio_outcome(float(ratio[worst]), count[worst], rest, of=count.size)
 
 
@@ -242,12 +242,12 @@ def steps_test(residuals: Residuals) -> TestOutcome:
     # What no baseline and no G takes of a step.
     square = steps[:, 1] - np.sum(steps[:, 2:] ** 2, axis=1)
     tested = square > _LEAST_STEP
-    count = max(int(tested.sum()), 1)
-    value = float(np.max(steps[tested, 0] ** 2 / square[tested], initial=0.0))
+    count = max(tested.sum(), 1)
+    value = np.max(steps[tested, 0] ** 2 / square[tested], initial=0.0)
     rest = None
     if not residuals.stated:
         rest = residuals.degrees - 1
-        value = rest * value / max(float(values @ values) - value, TINY)
+        value = rest * value / max(values @ values - value, TINY)
     outcome = ratio_outcome(value, 1, rest, of=count)
     return TestOutcome(math.sqrt(value), math.sqrt(outcome.limit), outcome.p_value)
 
@@ -314,7 +314,7 @@ def _traces(pairs: csr_array, basis: FloatArray) -> tuple[float, float, float]:
     first, second, third = products
     squared += np.sum(first * first.T) - 2 * np.trace(second)
     cubed += 3 * np.sum(first * second) - 3 * np.trace(third) - np.trace(first @ first @ first)
-    return float(-np.trace(first)), float(squared), float(cubed)
+    return -np.trace(first), squared, cubed
 
 
 def orthonormal(design: FloatArray, size: FloatArray | None = None) -> FloatArray:

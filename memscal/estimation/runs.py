@@ -49,7 +49,7 @@ class _Fit:
         flat = np.linalg.norm(estimate.gaussian.jacobian, axis=0)
         root[: flat.size] /= flat[:, None]
         leverage = np.sum(basis**2, axis=1)
-        degrees = leverage.size - round(float(leverage.sum()))
+        degrees = leverage.size - round(leverage.sum())
         if degrees < FEWEST_RESIDUALS:
             return None
         scaled = root * np.linalg.norm(left) / np.sqrt(degrees)
@@ -57,7 +57,7 @@ class _Fit:
 
     def tested(self, values: FloatArray, rows: FloatArray, of: int = 1) -> TestOutcome:
         """Test sums of coefficients, by those of the root, as one of so many tests: an F ratio."""
-        z = np.linalg.lstsq(rows, values, rcond=None)[0]
+        z = np.linalg.lstsq(rows, values)[0]
         return ratio_outcome(float(z @ z) / len(rows), len(rows), self.degrees, of)
 
 
@@ -75,7 +75,7 @@ def repeat_centres_test(estimate: ProfileEstimate) -> CentresApart | None:
     count = readings.size
     if points.planar or count == points.scans or readings.min() < MINIMUM_POSITIONS:
         return None
-    own = np.equal.outer(number, np.arange(count)).astype(np.float64)
+    own = np.eye(count)[number]
     along = points.along(points.positions)[:, None]
     shift = estimate.model.shift_derivative(estimate.gaussian.geometry, estimate.kernel)
     # The first repeat of each scan has the scan's centre, the others are shifted from it.  Each has
@@ -84,14 +84,14 @@ def repeat_centres_test(estimate: ProfileEstimate) -> CentresApart | None:
     shifted = np.diff(scan, prepend=-1) == 0
     shifts = own[:, shifted] * points.along(shift)[:, None]
     fit = _Fit.of(estimate, np.hstack([own, own * along, shifts]))
-    if fit is None:
+    if not fit:
         return None
     places = np.zeros(count)
     moved = fit.coefficients[-shifts.shape[1] :]
     places[shifted] = moved
     return CentresApart(
         **vars(fit.tested(moved, fit.root[-moved.size :])),
-        distance=max(float(np.ptp(places[scan == i])) for i in range(points.scans)),
+        distance=max(np.ptp(places[scan == i]) for i in range(points.scans)),
     )
 
 
@@ -127,11 +127,11 @@ def hysteresis_test(estimate: ProfileEstimate) -> BranchesApart | None:
     wider = estimate.conversion_constant * sigma * gaussian_transfer_slope(model.k, sigma)
     columns = [estimate.signal, model.signal(geometry, wider)]
     mean = np.bincount(points.scan, sign) / np.bincount(points.scan)
-    both = np.abs(mean)[points.scan] < np.abs(sign)
+    both = abs(mean)[points.scan] < abs(sign)
     if both.any():
         columns += [both * points.along(model.shift_derivative(geometry, estimate.kernel)), both]
-    fit = _Fit.of(estimate, sign[:, None] * np.stack(columns, axis=1))
-    if fit is None:
+    fit = _Fit.of(estimate, sign[:, None] * np.column_stack(columns))
+    if not fit:
         return None
     values = fit.coefficients[-len(columns) :]
     rows = fit.root[-len(columns) :]
@@ -170,9 +170,9 @@ def _centres_apart(
     scatter = inside @ inside / max(freedom, 1)
     noise = np.sum(root**2) / group.size
     if freedom and fdtrc(freedom, degrees, scatter / noise) < _WANDERS:
-        error = float(np.sqrt(scatter * share @ share))
+        error = np.sqrt(scatter * share @ share)
         degrees = freedom
-    return float(share @ centres), error, degrees
+    return share @ centres, error, degrees
 
 
 @array_record
@@ -196,9 +196,9 @@ def compare_runs(estimate: ProfileEstimate) -> RunsApart | None:
     count = readings.size
     if count == 1:
         return None
-    own = np.equal.outer(number, np.arange(count)).astype(np.float64)
+    own = np.eye(count)[number]
     fit = _Fit.of(estimate, np.hstack([own[:, 1:] * estimate.signal[:, None], own]))
-    if fit is None:
+    if not fit:
         return None
     # A run's baseline is its scan's and its own, whatever share of both is which.
     straight = 1 + points.free.sum(axis=1)
@@ -213,7 +213,7 @@ def compare_runs(estimate: ProfileEstimate) -> RunsApart | None:
     rows = others * (rows - rows.mean(axis=0))
     distances = others * (baselines - baselines.mean())
     errors = np.linalg.norm(rows, axis=1)
-    moved = int(np.argmax(np.abs(distances[:tests] / errors[:tests])))
+    moved = int(np.argmax(abs(distances[:tests] / errors[:tests])))
     offset = fit.tested(distances[[moved]], rows[[moved]], of=tests)
     run = number[fit.point]
     # Of scans without noise rounding is left.
@@ -221,10 +221,10 @@ def compare_runs(estimate: ProfileEstimate) -> RunsApart | None:
     square = np.bincount(run, fit.left**2 + floor**2, count)
     degrees = np.maximum(np.bincount(run, 1 - fit.leverage, count), 1.0)
     ratio = np.log(square / degrees / ((square.sum() - square) / (degrees.sum() - degrees)))
-    noisy = int(np.argmax(np.abs(ratio[:tests])))
+    noisy = int(np.argmax(abs(ratio[:tests])))
     louder = bool(ratio[noisy] > 0)
     pair = (degrees[noisy], degrees.sum() - degrees[noisy])
-    larger = float(np.exp(np.abs(ratio[noisy])))
+    larger = float(np.exp(abs(ratio[noisy])))
     noise = ratio_outcome(larger, *(pair if louder else pair[::-1]), of=2 * tests)
     distance = float(distances[moved])
     return RunsApart(count, offset, moved, distance, float(errors[moved]), noise, noisy, louder)

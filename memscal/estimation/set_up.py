@@ -39,11 +39,11 @@ def reference_profile(scan: Scan, reference: BaseStress | None) -> BaseStress:
 def with_film_of(reference: BaseStress | None, scan: Scan) -> Scan:
     """Return a scan with film and rod if the reference depends on them, else without."""
     stress = reference or scan.reference
-    if stress is None:
+    if not stress:
         return scan
     film = film_of(stress)
     rod = scan.indenter or stress.indenter
-    if film is None or not isinstance(rod, Rod):
+    if not film or not isinstance(rod, Rod):
         return replace(scan, film=None, indenter=None, rod_friction=None)
     return replace(scan, film=scan.film or film, indenter=rod)
 
@@ -93,7 +93,7 @@ def require_one_sensor(scans: Sequence[Scan]) -> tuple[Scan, ...]:
             cure="Calibrate each sensor by itself; check /entry/instrument/stress_sensor.",
         )
     films: dict[str, ElasticFilm] = {}
-    for film in (scan.film for scan in scans if scan.film is not None):
+    for film in (scan.film for scan in scans if scan.film):
         first = films.setdefault(film.name, film)
         if film.name and first != film:
             raise InputError(
@@ -110,7 +110,7 @@ def require_one_sensor(scans: Sequence[Scan]) -> tuple[Scan, ...]:
 
 def require_calibration_rod(scan: Scan, reference: BaseStress | None) -> None:
     """Refuse an indenter that cannot calibrate, and lengths that no set-up has."""
-    if scan.indenter is not None and not isinstance(scan.indenter, Rod):
+    if scan.indenter and not isinstance(scan.indenter, Rod):
         raise InputError(
             f"The scan was made with a {scan.indenter.shape}, but a calibration needs a rod.",
             why="Only a contact smaller than the film's thickness is independent of friction and "
@@ -118,7 +118,7 @@ def require_calibration_rod(scan: Scan, reference: BaseStress | None) -> None:
             cure="Calibrate with a rod scan, then apply the apparatus function to this scan.",
         )
     require_pressed(scan.motion, scan.source)
-    if with_film_of(reference, scan).film is not None:
+    if with_film_of(reference, scan).film:
         require_plausible(scan)
 
 
@@ -135,10 +135,10 @@ def require_same_set_up(
     differences: list[Difference] = []
     for scan, reference in zip(scans, references, strict=True):
         stress = reference or scan.reference
-        if stress is not None and stress.form is None:
+        if stress and not stress.form:
             differences += _other_set_up(scan, stress, "reference")
     for scan, stress in zip(scans, alternatives, strict=False):
-        if stress is not None:
+        if stress:
             differences += _other_set_up(scan, stress, "alternative")
     cure = "Give a stress that was calculated for the scan (memscal reference), or correct the "
     cure += "value that is wrong."
@@ -160,7 +160,7 @@ def _other_set_up(scan: Scan, stress: BaseStress, kind: str) -> Iterator[Differe
     source = None if isinstance(stress, Contact) else stress.source
     places = (file_in_words(scan.source, "scan"), file_in_words(source, kind))
     film = film_of(stress)
-    law = "" if film is None else film.law
+    law = film.law if film else ""
     names = ["thickness", "poisson_ratio"]
     finite = {law, scan.film.law if scan.film and film else ""} - {"", LINEAR}
     if finite:
@@ -190,9 +190,9 @@ def _farthest(scan: Scan, stress: BaseStress) -> SimpleNamespace:
     loads = np.atleast_1d(scan.stated_load if scan.normal_load is None else scan.normal_load)
     stated = [u for u in (scan.load_uncertainty, scan.normal_load_errors) if u is not None]
     spread = np.sqrt(sum((np.square(u) for u in stated), start=np.zeros(loads.shape)))
-    i = np.nanargmax(np.abs(loads - stress.load) - COVERAGE * spread)
-    uncertainty = float(spread.flat[i]) if stated else None
-    return SimpleNamespace(load=float(loads.flat[i]), load_uncertainty=uncertainty)
+    i = np.nanargmax(abs(loads - stress.load) - COVERAGE * spread)
+    uncertainty = spread.flat[i] if stated else None
+    return SimpleNamespace(load=loads.flat[i], load_uncertainty=uncertainty)
 
 
 def file_in_words(source: SourceFile | None, kind: str) -> str:

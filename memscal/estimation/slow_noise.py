@@ -33,23 +33,23 @@ def slow_noise(estimate: ProfileEstimate, residuals: Residuals) -> SlowNoise | N
     known = estimate.points.planar or estimate.points.decorrelation or place.size > _MOST
     if known or residuals.degrees < FEWEST_RESIDUALS:
         return None
-    apart = np.abs(np.subtract.outer(place, place))
+    apart = abs(np.subtract.outer(place, place))
     same = np.equal.outer(residuals.sequence, residuals.sequence)
     kinds = same * np.exp(-apart / _LENGTHS[:, None, None]) * _SHARES[:, None, None]
     kinds[:, range(place.size), range(place.size)] = 1.0
     roots = np.linalg.cholesky(kinds)
     # C^-1/2 [Q z] = OR: R ends with the root of S, and the rest gives the determinant.
     whitened = np.linalg.solve(roots, np.column_stack([residuals.basis, residuals.values]))
-    ends = np.abs(np.diagonal(np.linalg.qr(whitened, mode="r"), axis1=1, axis2=2))
+    ends = abs(np.diagonal(np.linalg.qr(whitened, mode="r"), axis1=1, axis2=2))
     square = ends[:, -1] ** 2
     log_weight = np.log(_PRIOR) - np.log(np.diagonal(roots, axis1=1, axis2=2)).sum(axis=1)
     log_weight -= np.log(ends[:, :-1]).sum(axis=1) + residuals.degrees / 2 * np.log(square)
     weight = np.exp(log_weight - np.logaddexp.reduce(log_weight))
     covariance = np.tensordot(weight * square / square[0], kinds, 1)
-    probability = float(weight[1:].sum())
+    probability = weight[1:].sum()
     return SlowNoise(
         probability=probability,
-        length=float(weight[1:] @ _LENGTHS[1:]) / probability,
-        share=float(weight @ _SHARES) / probability,
+        length=weight[1:] @ _LENGTHS[1:] / probability,
+        share=weight @ _SHARES / probability,
         covariance=Decorrelation(((residuals.point, np.linalg.cholesky(covariance)),)),
     )

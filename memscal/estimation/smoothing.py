@@ -76,7 +76,7 @@ class SmoothedProfile:
     def noise(self) -> FloatArray:
         """Standard uncertainty of each component of the transform from noise, in V m^2/N."""
         ordinary = self.estimate.outlier_weight >= OUTLIER_WEIGHT
-        floor = _FLOOR_OF_NOISE * np.abs(self.signal[ordinary]).max()
+        floor = _FLOOR_OF_NOISE * abs(self.signal[ordinary]).max()
         electronic = np.sum(self.estimate.scattered(self.gain) ** 2, axis=1)
         plain = np.diag(self.gain.covariance(np.ones_like(self.signal)))
         variance: FloatArray = electronic + floor**2 * plain
@@ -131,7 +131,7 @@ def _fitted(
     noise = (estimate.noise / estimate.outlier_weight**0.5)[rows] / points.load[rows]
     # An outlier may be a thousand times the signal.
     ordinary = estimate.outlier_weight[rows] >= OUTLIER_WEIGHT
-    weight = 1 / (noise**2 + (_FLOOR_OF_NOISE * np.abs(y[ordinary]).max()) ** 2)
+    weight = 1 / (noise**2 + (_FLOOR_OF_NOISE * abs(y[ordinary]).max()) ** 2)
     if reference.source:
         # A source ends: what decays is G about it.
         blurred = gaussian_transfer(estimate.model.k, estimate.gaussian.sigma)
@@ -254,11 +254,11 @@ def _layout(
     free = np.eye(tied.size) if source else np.linalg.svd(tied)[2][1:].T
     curved = basis(nodes, _ORDER).toarray() * step**_ORDER
     values = basis(nodes, 0).toarray()
-    rho = 1 / (np.abs(stress) / peak + _FLOOR) ** 2
+    rho = 1 / (abs(stress) / peak + _FLOOR) ** 2
     # What no penalty holds, a parabola, is held by next to nothing.
     rows = np.vstack([curved, _NEXT_TO_NOTHING * values]) @ free
     rows *= np.tile(np.sqrt(weights * rho), 2)[:, None]
-    phase = np.multiply.outer(k, nodes)
+    phase = np.outer(k, nodes)
     bessel = 2 * np.cos(phase) if order == ACROSS else 2 * np.pi * j0(phase) * nodes
     bessel *= weights
     transform = bessel @ values @ free

@@ -74,7 +74,7 @@ class VoltageMap:
         merged = {id(right): (left, right) for left, right in self.parts}
         for left, right in other.parts:
             known = merged.get(id(right))
-            merged[id(right)] = (left if known is None else known[0] + left, right)
+            merged[id(right)] = (known[0] + left if known else left, right)
         return VoltageMap(tuple(merged.values()))
 
     def __sub__(self, other: VoltageMap) -> VoltageMap:
@@ -97,11 +97,11 @@ class VoltageMap:
         parts = []
         for left, right in self.parts:
             columns: Any = right
-            if factor is not None:
+            if factor:
                 dense = right if isinstance(right, np.ndarray) else right.toarray()
                 columns = factor.correlate_adjoint(noise[:, None] * dense)
             parts.append((left, columns))
-        scale = noise if factor is None else None
+        scale = None if factor else noise
         total: FloatArray = np.zeros((len(self), len(self)))
         for i, (left, right) in enumerate(parts):
             total += left @ _gram(right, right, scale) @ left.T

@@ -140,13 +140,13 @@ def _shown_radius(radial: ApparatusRadial) -> float:
     """Return the radius to draw up to: where G, or its Gaussian, has died away."""
     peak = _peak(radial)
     last = float(radial.r[-1])
-    alive = np.flatnonzero(np.maximum(np.abs(radial.g), radial.g_gaussian) > 1e-3 * peak)
+    alive = np.flatnonzero(np.maximum(abs(radial.g), radial.g_gaussian) > 1e-3 * peak)
     gaussian_alive = np.flatnonzero(radial.g_gaussian > 1e-3 * peak)
     if not alive.size or not gaussian_alive.size:
         return last
     # Ripples of a poor deconvolution reach far; the Gaussian bounds the sensor.
     far = min(radial.r[alive[-1]], 1.6 * radial.r[gaussian_alive[-1]])
-    return float(min(1.1 * far, last)) or last
+    return min(1.1 * far, last) or last
 
 
 def _peak(radial: ApparatusRadial) -> float:
@@ -190,8 +190,8 @@ def _draw_maps(figure: Figure, place: SubplotSpec, data: ApparatusData, loads: L
 def _draw_g(axes: Axes, data: ApparatusData) -> Axes:
     field = data.field
     reach = 5 * data.gaussian_sigma
-    x = np.abs(field.x) <= reach
-    y = np.abs(field.y) <= reach
+    x = abs(field.x) <= reach
+    y = abs(field.y) <= reach
     g = field.g[np.ix_(y, x)] / PER_MM2
     plane = (field.x[x] / MM, field.y[y] / MM, g)
     drawn = axes.pcolormesh(*plane, cmap="viridis", rasterized=True)
@@ -210,7 +210,7 @@ def _draw_points(
     x = np.asarray(scan.offset_x)
     y = np.asarray(scan.offset_y)
     lattice = even_lattice(x, y, x.size)
-    if lattice is None:
+    if not lattice:
         return axes.scatter(x / MM, y / MM, _DOTS / x.size, values, lw=0, **look)
     along, across = lattice
     nodes = [(a.start + a.step * np.arange(a.index.max() + 1)) / MM for a in lattice]
@@ -332,12 +332,12 @@ def _setting(data: ApparatusData, loads: Loads) -> str:
     film = data.film
     rod = data.indenter
     parts = []
-    if rod is not None:
+    if rod:
         load = f", {data.load:.3g} N" if data.load else ""
         if len(loads) > 1:
             load = f", {loads[0][0]} to {loads[-1][0]}"
         parts.append(f"{rod.shape} of radius {rod.radius / MM:.3g} mm{load}")
-    if film is not None:
+    if film:
         modulus = f"E = {film.young_modulus / KPA / 1e3:.3g} MPa"
         law = f", {film.law_text}" if film.law else ""
         elasticity = f"{modulus}, ν = {film.poisson_ratio:.3g}{law}"

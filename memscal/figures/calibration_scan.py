@@ -189,7 +189,7 @@ def _as_curve(x: FloatArray, u: FloatArray) -> ArrayPair:
     """Return positions in order with one value for each, where repeats agree; else as given."""
     places, inverse = np.unique(x, return_inverse=True)
     mean = np.bincount(inverse, weights=u) / np.bincount(inverse)
-    agree = np.max(np.abs(u - mean[inverse])) <= 1e-3 * np.ptp(u)
+    agree = np.max(abs(u - mean[inverse])) <= 1e-3 * np.ptp(u)
     return (places, mean) if agree else (x, u)
 
 
@@ -208,7 +208,7 @@ def _draw_reference(axes: Axes, data: ApparatusData, *, net: bool = False) -> Fl
     reference = data.reference
     constant = data.conversion_constant
     stress = _seen_stress(data)
-    curved = data.film is not None and data.film.law not in ("", LINEAR)
+    curved = data.film and data.film.law not in ("", LINEAR)
     # Of a curved law the stress at another load has another shape.
     other = curved and data.load and loads_differ((data.load, reference.load))
     # A point is nothing beside its axis.
@@ -243,7 +243,7 @@ def _seen_stress(data: ApparatusData) -> FloatArray | None:
     reference = data.reference
     factor = (data.load or reference.load) / reference.load
     if data.reading.relative:
-        factor = 1 / (np.abs(reference.sigma_zz).max() or 1.0)
+        factor = 1 / (abs(reference.sigma_zz).max() or 1.0)
     if not _tangential(data):
         return reference.sigma_zz * factor
     return None if reference.sigma_rz is None else -reference.sigma_rz * factor
@@ -347,20 +347,21 @@ def _limit_to_scan(axes: Axes, x: FloatArray) -> None:
 def draw_residuals(axes: Axes, data: ApparatusData, loads: Loads) -> None:
     """Draw residuals over each point's standard uncertainty; those beyond the axis at its edge."""
     scan = data.reconvolution
+    x = scan.x
     with_g, with_gaussian, scale = standardised(scan)
     # One outlier cannot stretch the axis.
     sizes = np.abs([with_g, with_gaussian])
     limit = max(3.5, min(1.1 * np.max(sizes), 2.0 * np.quantile(sizes, 0.9)))
     draw_residual_band(axes)
-    many = scan.x.size > SCATTER_THRESHOLD
+    many = x.size > SCATTER_THRESHOLD
     common = {
         "ls": "none",
-        "ms": 1.2 if many else marker_size(scan.x.size),
+        "ms": 1.2 if many else marker_size(x.size),
         "mew": 0.3 if many else 0.7,
         "rasterized": many,
     }
     gaussian = common | {"color": GAUSSIAN, "marker": "s", "mfc": "none"}
-    _draw_residual_points(axes, scan.x, with_gaussian, "Gaussian", limit, gaussian)
+    _draw_residual_points(axes, x, with_gaussian, "Gaussian", limit, gaussian)
     looks = _looks(loads, DECONVOLVED)
     for i, ((load, part), (colour, marker)) in enumerate(zip(loads, looks, strict=True)):
         name = "_" * (i >= MOST_PANELS) + (load or "G")
@@ -369,8 +370,8 @@ def draw_residuals(axes: Axes, data: ApparatusData, loads: Loads) -> None:
         _draw_residual_points(axes, part.reconvolution.x, z, name, limit, look)
     axes.set_ylim(-limit, limit)
     axes.set_ylabel(f"residual / {scale}")
-    _limit_to_scan(axes, scan.x)
-    legend_above(axes, points=scan.x.size)
+    _limit_to_scan(axes, x)
+    legend_above(axes, points=x.size)
 
 
 def _draw_residual_points(

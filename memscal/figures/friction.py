@@ -166,8 +166,7 @@ def comparison_figure(
         draw_profiles(profiles, comparison, loads)
         _draw_maxima(maxima, comparison, loads[0].loading)
         best = joint_estimate(comparison, loads).best
-        largest = draw_residuals(residuals, comparison, loads, best)
-        share_limits([residuals], largest)
+        share_limits([residuals], draw_residuals(residuals, comparison, loads, best))
         profiles.set_xlabel(ALONG_RADIUS)
         residuals.set_xlim(profiles.get_xlim())
         _draw_effective(effective, comparison, loads)
@@ -187,7 +186,7 @@ def comparison_figures(comparison: FrictionComparison) -> Mapping[str, Callable[
     figures["maxima"] = partial(maxima_figure, comparison)
     figures["effective-friction"] = partial(_panels, comparison, _draw_effective, 2.7, _BOTH_NOTE)
     figures["likelihood"] = partial(_panels, comparison, _draw_likelihood, 2.4, INTERVAL_NOTE)
-    if comparison.interface is not None:
+    if comparison.interface:
         figures["interface"] = partial(hook("interface_figure"), comparison)
     return figures
 
@@ -218,7 +217,7 @@ def _draw_effective(axes: Axes, comparison: FrictionComparison, loads: Loads) ->
     axes.axhspan(*interval_ends(joint), color=REFERENCE, alpha=0.18, lw=0, label=label)
     if joint.value is not None:
         axes.axhline(float(friction_position(joint.value)), color=REFERENCE, lw=0.8)
-    if comparison.macroscopic is not None:
+    if comparison.macroscopic:
         value, u = comparison.macroscopic
         label = f"macroscopic, ±{coverage():g}u" if u else "macroscopic"
         axes.axhline(float(friction_position(value)), color=MUTED, lw=0.8, ls="--", label=label)

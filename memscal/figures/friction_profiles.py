@@ -132,7 +132,7 @@ def _draw_points(
     r = profile.r / MM
     s = profile.s_zz / KPA
     bars = coverage() * profile.s_zz_errors / KPA
-    clear = s > bars if logarithmic else np.ones(s.size, dtype=bool)
+    clear = s > bars if logarithmic else np.ones(s.size, bool)
     look = mark(at_load.lubrication, colour) | _BARS | {"many": s.size > SCATTER_THRESHOLD}
     for shown, alpha in ((clear, None), (~clear & (s > 0), _PALE)):
         if shown.any():
@@ -160,10 +160,10 @@ def profile_figure(comparison: FrictionComparison, lubrication: str) -> Figure:
     with panels_of(4.6, 2, 2, height_ratios=(2.2, 1), sharex=True) as (figure, panels):
         draw_profiles(panels[0, 0], comparison, loads)
         draw_profiles(panels[0, 1], comparison, loads, logarithmic=True)
-        largest = 0.0
-        for axes, index in zip(panels[1], (0, -1), strict=True):
-            friction = comparison.friction[index]
-            largest = max(largest, draw_residuals(axes, comparison, loads, friction))
+        largest = max(
+            draw_residuals(axes, comparison, loads, friction)
+            for axes, friction in zip(panels[1], comparison.friction[[0, -1]], strict=True)
+        )
         share_limits(panels[1], largest)
     return figure
 
@@ -249,7 +249,7 @@ def _draw_residuals(
     z = (profile.s_zz - calculated) / profile.s_zz_errors
     look = mark(at_load.lubrication, colour) | {"ls": "none", "ms": 2.5, "mew": 0.6}
     draw_measured(axes, profile.r / MM, z, None, many=z.size > SCATTER_THRESHOLD, **look)
-    return float(np.abs(z).max())
+    return float(abs(z).max())
 
 
 def friction_set_figure(comparison: FrictionComparison, lubrication: str) -> Figure:
@@ -305,7 +305,7 @@ def friction_set_figure(comparison: FrictionComparison, lubrication: str) -> Fig
 
 def _shown_indices(comparison: FrictionComparison) -> list[int]:
     """Return indices of the coefficients to draw: some of them, the ends always."""
-    nearest = {int(np.argmin(np.abs(comparison.friction - mu))) for mu in _SHOWN}
+    nearest = {int(np.argmin(abs(comparison.friction - mu))) for mu in _SHOWN}
     return sorted(nearest | {0, comparison.friction.size - 1})
 
 

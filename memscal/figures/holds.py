@@ -15,6 +15,7 @@ _MOST_ROWS = 20_000
 
 def holds_figure(holds: Holds) -> Figure:
     """Draw position, load and reading over the lines of the file, and readings over position."""
+    mean = holds.mean
     reading = holds.reading
     reading_label = f"reading ({reading.unit})"
     names = {
@@ -32,16 +33,17 @@ def holds_figure(holds: Holds) -> Figure:
             label, scale = names[name]
             log = holds.log[name] / scale
             axes.plot(holds.line[::every], log[::every], color="0.6", lw=0.7)
-            axes.hlines(holds.mean[name] / scale, first, last, color=GAUSSIAN, lw=2.5, zorder=3)
+            axes.hlines(mean[name] / scale, first, last, color=GAUSSIAN, lw=2.5, zorder=3)
             axes.set_ylabel(label)
             axes.sharex(panels[0])
-        title = f"{first.size} holds (thick) in {holds.line.size} rows of the log"
-        panels[0].set_title(title, loc="left")
+        panels[0].set_title(
+            f"{first.size} holds (thick) in {holds.line.size} rows of the log", loc="left"
+        )
         panels[-2].set_xlabel("line of the file")
         axes = panels[-1]
-        along = "y" if np.ptp(holds.mean.get("y", 0.0)) > np.ptp(holds.mean["x"]) else "x"
-        x = holds.mean[along] / MM
-        u = holds.mean["u_zz"] / reading.scale
+        along = "y" if np.ptp(mean.get("y", 0.0)) > np.ptp(mean["x"]) else "x"
+        x = mean[along] / MM
+        u = mean["u_zz"] / reading.scale
         bars = 2 * holds.u_errors / reading.scale
         axes.errorbar(
             x,

@@ -81,8 +81,10 @@ def html_report(result: Told) -> str:
     report = report_of(result)
     tables = [table for table in result.tables() if table.title != CHECKS]
     explained = checks_table(worst_checks(report.checks), meanings=True)
-    title = "Each passes up to its limit; of one made several times, what failed and the worst"
-    checks = replace(explained, title=title)
+    checks = replace(
+        explained,
+        title="Each passes up to its limit; of one made several times, what failed and the worst",
+    )
     items = "\n".join(f"<li>{escape(text)}</li>" for text in marked_texts(report.messages))
     sections = {
         "Results": _html(tables[: report.leading]),
@@ -348,8 +350,11 @@ def _budget(*rows: tuple[Quantity, Mapping[str, float], float, str], down: bool 
         cells.append(f"{100 * total / abs(value):.2g}%" if value else "–")
         lines.append((subject + quantity.heading, *cells))
     head, *body = zip(*lines, strict=True) if down else lines
-    title = "Standard uncertainty by source, and its share of the variance"
-    return Table(title, head, body if sources else [])
+    return Table(
+        "Standard uncertainty by source, and its share of the variance",
+        head,
+        body if sources else [],
+    )
 
 
 def _share(u: float | None, total: float, scale: float) -> str:
@@ -363,14 +368,14 @@ def _provenance(report: Report) -> list[Table]:
     """Return program, files, options and versions."""
     process = report.process
     rows = []
-    if process is not None:
+    if process:
         rows = [("program", f"{process.program} {process.version}"), ("date", process.date)]
     for name, source in report.files.items():
-        if source is not None:
+        if source:
             rows.append((f"input {name}", source.file_name))
             rows.append((f"its SHA-256 ({name})", source.sha256))
     tables = [Table("What was run on what", ("item", "value"), rows)]
-    if process is not None:
+    if process:
         tables.append(_named_values("Options", process.configuration))
         tables.append(_named_values("Versions", process.environment))
     return tables

@@ -44,11 +44,12 @@ _DECADES = 1e-3
 def measured_stress_figure(measured: MeasuredStress) -> Figure:
     """Draw the measured profiles of all loads against the distance from the centre."""
     # Dots of many points have no bars.
-    many = min(profile.r.size for profile in measured.profiles) > SCATTER_THRESHOLD
+    profiles = measured.profiles
+    many = min(profile.r.size for profile in profiles) > SCATTER_THRESHOLD
     with panels_of(3.6, 1, 2, "" if many else COVERAGE_NOTE) as (figure, panels):
         linear, logarithmic = panels
-        looks = load_looks(profile.load for profile in measured.profiles)
-        for profile in measured.profiles:
+        looks = load_looks(profile.load for profile in profiles)
+        for profile in profiles:
             colour, _ = looks[profile.load]
             clear = profile.s_zz > coverage() * profile.s_zz_errors
             _draw(linear, profile, colour, np.ones_like(clear))
@@ -61,15 +62,16 @@ def measured_stress_figure(measured: MeasuredStress) -> Figure:
         logarithmic.set_title(
             f"logarithmic scale; pale: less than {coverage():g}u", fontsize=8, loc="left"
         )
-        top = max(profile.s_zz.max() for profile in measured.profiles) / KPA
+        top = max(profile.s_zz.max() for profile in profiles) / KPA
         logarithmic.set_yscale("log")
         logarithmic.set_ylim(_DECADES * top, 1.6 * top)
         logarithmic.yaxis.set_major_formatter("{x:g}")
         # Loads by colour and states by mark, once for both panels.
-        handles = []
-        for colour, name in dict.fromkeys(looks.values()):
-            handles.append(Line2D([], [], color=colour, lw=2.0, label=name))
-        for state in dict.fromkeys(profile.lubrication for profile in measured.profiles):
+        handles = [
+            Line2D([], [], color=colour, lw=2.0, label=name)
+            for colour, name in dict.fromkeys(looks.values())
+        ]
+        for state in dict.fromkeys(profile.lubrication for profile in profiles):
             look = mark(state, "0.2")
             words = state or "measured"
             if many:
@@ -125,10 +127,9 @@ def _draw_stress(axes: Axes, restored: Restoration) -> None:
     draw_band(axes, r, stress - band, stress + band)
     axes.plot(r, stress, color=DECONVOLVED, label=rf"restored $\sigma_{{zz}}$, ±{coverage():g}u")
     blurred = restored.blurred_stress(restored.r) / KPA
-    label = r"blurred again, $S_{zz} = G*\sigma_{zz}$"
-    axes.plot(r, blurred, color=GAUSSIAN, ls="-.", label=label)
+    axes.plot(r, blurred, color=GAUSSIAN, ls="-.", label=r"blurred again, $S_{zz} = G*\sigma_{zz}$")
     compared = restored.comparison
-    if compared is not None:
+    if compared:
         label = "expected"
         if isinstance(compared.stress, Contact):
             friction = compared.stress.friction
@@ -158,8 +159,8 @@ def _draw_stress(axes: Axes, restored: Restoration) -> None:
 def _draw_residuals(axes: Axes, restored: Restoration) -> None:
     """Draw residuals over their noise; those beyond the axis are drawn at its edge."""
     z = restored.residual / restored.noise
-    limit = max(_LEAST_LIMIT, min(1.1 * np.abs(z).max(), 8.0))
-    ordinary = np.abs(z) <= limit
+    limit = max(_LEAST_LIMIT, min(1.1 * abs(z).max(), 8.0))
+    ordinary = abs(z) <= limit
     along = "x" if restored.points.free[0, 0] else "y"
     side = getattr(restored.points, along) / MM
     draw_residual_band(axes)

@@ -101,9 +101,10 @@ def drawn_as(
         if not k > 0:
             raise ValueError("no band is drawn with it")
     except (KeyError, OSError, TypeError, ValueError) as error:
-        problem = f"No figure has figsize={figsize!r}, k={k!r} and style={style!r}: {error}."
-        cure = "Give width and height in inches, and styles of matplotlib or its settings."
-        raise InputError(problem, cure=cure) from error
+        raise InputError(
+            f"No figure has figsize={figsize!r}, k={k!r} and style={style!r}: {error}.",
+            cure="Give width and height in inches, and styles of matplotlib or its settings.",
+        ) from error
     token = _LOOK.set((k, style, not panels))
     try:
         figure = draw()

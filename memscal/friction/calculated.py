@@ -90,7 +90,7 @@ def external_family(
 
     def numbers(name: str) -> FloatArray:
         """Numbers of all tables, not a number where one is not stated."""
-        return np.array([[getattr(cell, name) for cell in row] for row in grid], dtype=np.float64)
+        return np.array([[getattr(cell, name) for cell in row] for row in grid], np.float64)
 
     return replace(
         solved,
@@ -116,10 +116,10 @@ def _grid(
         row = []
         for load in loads.tolist():
             nearest = _nearest(tables, mu, load)
-            if nearest is None:
-                missing.append(f"{load:g} N with friction {mu:g}")
-            else:
+            if nearest:
                 row.append(nearest)
+            else:
+                missing.append(f"{load:g} N with friction {mu:g}")
         grid.append(row)
     if missing:
         stated = ", ".join(f"{load:g}" for load in sorted({table.load for _, table in tables}))
@@ -135,10 +135,11 @@ def _grid(
 
 def _nearest(tables: Sequence[_Table], mu: float, load: float) -> StressProfile | None:
     """Return the table of a friction coefficient whose load is nearest, and near enough."""
-    near = []
-    for friction, profile in tables:
-        if friction == mu and abs(profile.load / load - 1) <= _SAME_LOAD:
-            near.append(profile)
+    near = [
+        profile
+        for friction, profile in tables
+        if friction == mu and abs(profile.load / load - 1) <= _SAME_LOAD
+    ]
     near.sort(key=lambda profile: abs(profile.load - load))
     if len(near) > 1 and near[0].load == near[1].load:
         raise InputError(
@@ -156,7 +157,7 @@ def _checked_friction(profile: StressProfile, reach: float) -> float:
             f"{_name(profile)} does not say its friction coefficient.",
             cure="State it when the table is imported (--friction).",
         )
-    size = np.abs(profile.sigma_zz)
+    size = abs(profile.sigma_zz)
     tail = size[-1] / size.max()
     if profile.r[-1] < reach and tail > _DECAYED:
         end = profile.r[-1] * 1e3

@@ -99,6 +99,8 @@ def frictionless_check(by_loading: ByLoading, beside: Sequence[ByLoading]) -> Qu
 
 #: Calculated contacts that are less certain than this share of their stress are named.
 _COARSE = 2e-3
+#: Of the uncertainty that a rectangle adds where it is as wide as the rest is large.
+_LARGE_SHARE = 1 / math.sqrt(13)
 
 
 def comparison_messages(
@@ -108,11 +110,19 @@ def comparison_messages(
     checks: tuple[QualityCheck, ...],
 ) -> tuple[Message, ...]:
     """Return the messages of a comparison and of its measured stress, failed checks first."""
-    messages = [
-        *quality.failed_check_messages(checks),
-        *synthetic_messages(measured),
-        *_loadings(joint),
-    ]
+    messages = [*quality.failed_check_messages(checks), *synthetic_messages(measured)]
+    # Where the definitions of the loading disagree.
+    for lubrication, by_loading in joint.items():
+        first, *_ = by_loading.values()
+        apart = first.budget.get("loading", 0.0)
+        if apart > _LARGE_SHARE * (first.standard_uncertainty or math.inf):
+            message = Message(
+                "loading",
+                f"The definitions of the loading disagree ({lubrication or 'all'} loads) by "
+                f"{math.sqrt(12) * apart:.2g}, more than one standard uncertainty: its middle is "
+                "given.",
+            )
+            messages.append(message)
     for family in families.values():
         worst = np.nanmax(family.convergence, initial=0.0)
         if worst > _COARSE:
@@ -138,21 +148,3 @@ def synthetic_messages(measured: MeasuredStress) -> Iterator[Message]:
     """Say where the scans are synthetic."""
     if any(scan.synthetic for scan in measured.scans):
         yield Message("synthetic", "The scans are synthetic: nothing here was measured.")
-
-
-#: Of the uncertainty that a rectangle adds where it is as wide as the rest is large.
-_LARGE_SHARE = 1 / math.sqrt(13)
-
-
-def _loadings(joint: Joint) -> Iterator[Message]:
-    """Say where the definitions of the loading disagree."""
-    for lubrication, by_loading in joint.items():
-        first, *_ = by_loading.values()
-        apart = first.budget.get("loading", 0.0)
-        if apart > _LARGE_SHARE * (first.standard_uncertainty or math.inf):
-            text = (
-                f"The definitions of the loading disagree ({lubrication or 'all'} loads) by "
-                f"{math.sqrt(12) * apart:.2g}, more than one standard uncertainty: its middle is "
-                "given."
-            )
-            yield Message("loading", text)

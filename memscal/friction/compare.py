@@ -78,9 +78,8 @@ def require_contacts(scans: Sequence[Scan | MeasuredScan]) -> None:
         if isinstance(scan, Scan) and scan.y is not None:
             require_line(place, scan.x, scan.y)
         if (scan.film, scan.indenter) != (scans[0].film, scans[0].indenter):
-            problem = f"{place} states another film or sphere than the first scan."
             raise InputError(
-                problem,
+                f"{place} states another film or sphere than the first scan.",
                 why="Scans that are compared together share the calculated contacts.",
                 cure="Compare them one by one, or correct /entry/sample/film and /entry/indenter.",
             )
@@ -239,8 +238,10 @@ def compare(
     tangential = None if shear is None else opened_apparatus(shear, accept_altered=accept_altered)
     _require_macroscopic(macroscopic, macroscopic_uncertainty, interface=interface)
     if lubricated not in (None, FRICTIONLESS, APART):
-        problem = f"Lubricated loads cannot be fitted {lubricated!r}."
-        raise InputError(problem, cure=f"Give {FRICTIONLESS!r} or {APART!r}, or leave it out.")
+        raise InputError(
+            f"Lubricated loads cannot be fitted {lubricated!r}.",
+            cure=f"Give {FRICTIONLESS!r} or {APART!r}, or leave it out.",
+        )
     if lubricated and lubricated_friction not in (0.0, LUBRICATED_FRICTION):
         raise InputError(
             f"Lubricated loads are to be fitted {lubricated!r}, and with a friction of their own.",
@@ -250,27 +251,27 @@ def compare(
     require_non_negative("gain between scans", between_scan_gain)
     beside = {None: lubricated_friction, FRICTIONLESS: 0.0, APART: None}[lubricated]
     require_contacts(scans_of(opened))
-    _require_few(opened, [one.sensor.channel for one in (sensor, tangential) if one is not None])
+    _require_few(opened, [one.sensor.channel for one in (sensor, tangential) if one])
     measured = _measured(opened, sensor, override)
     setting = _setting(measured, cache, workers)
     if sensor.order:
-        others = (references, lubricated, shear, macroscopic)
-        if any(option is not None for option in others):
-            problem = "The artifact is of a tangential channel, with options of the normal one."
+        if any(option is not None for option in (references, lubricated, shear, macroscopic)):
             raise InputError(
-                problem,
+                "The artifact is of a tangential channel, with options of the normal one.",
                 cure="Leave out references, lubricated, shear and macroscopic, or give that of zz.",
             )
         return _compared_by_shear(measured, sensor, setting, friction, loading, override)
-    if tangential is not None and references is not None:
-        problem = "Profiles of another program and the shear are asked for."
-        raise InputError(problem, cure="Leave one of them out: those profiles have no shear.")
-    notes = [] if tangential is None else _accept_tangential(measured, tangential, override)
+    if tangential and references is not None:
+        raise InputError(
+            "Profiles of another program and the shear are asked for.",
+            cure="Leave one of them out: those profiles have no shear.",
+        )
+    notes = _accept_tangential(measured, tangential, override) if tangential else []
 
     # Calculate the contacts, by the definition of their loading.
     families = _families(setting, friction, loading, references)
     shear_families = None
-    if tangential is not None:
+    if tangential:
         shear_families = _families(setting, friction, loading, order=1)
 
     # Fit and check.
@@ -285,7 +286,7 @@ def compare(
         shear_families=shear_families,
         macroscopic=sliding,
     )
-    if comparison.unexplained and references is None and tangential is None:
+    if comparison.unexplained and references is None and not tangential:
         first, *_ = channels_of(measured, sensor, families, (), between_scan_gain).values()
         # At three times the loads a contact may have no solution.
         with suppress(MemscalError):
@@ -306,7 +307,7 @@ def compare(
     # Record.
     altered = accepted_alterations(*(profile.source for profile in references or ()))
     messages = [*override_messages(altered), *comparison.messages, *notes]
-    if laws is not None:
+    if laws:
         messages += laws.messages
     return replace(comparison, interface=laws, messages=tuple(messages))
 
@@ -334,15 +335,23 @@ def _require_few(contacts: Sequence[Scan | MeasuredStress], channels: Sequence[s
         for name, size, shared in _readings(item, channels):
             total += size
             if shared and size > MOST_COMPARED_TOGETHER:
-                what = "readings that share noise (a correlation, or two channels)"
-                why = "A matrix over them is held in memory for each friction coefficient."
-                cure = "Average neighbouring readings, or compare without correlation and shear."
-                raise too_large(name, size, MOST_COMPARED_TOGETHER, what, why=why, cure=cure)
+                raise too_large(
+                    name,
+                    size,
+                    MOST_COMPARED_TOGETHER,
+                    "readings that share noise (a correlation, or two channels)",
+                    why="A matrix over them is held in memory for each friction coefficient.",
+                    cure="Average neighbouring readings, or compare without correlation and shear.",
+                )
     if total > MOST_COMPARED:
-        what = "What is compared"
-        why = "Columns over them are held for each friction coefficient."
-        cure = "Average neighbouring readings, or leave out repeats."
-        raise too_large(what, total, MOST_COMPARED, "readings", why=why, cure=cure)
+        raise too_large(
+            "What is compared",
+            total,
+            MOST_COMPARED,
+            "readings",
+            why="Columns over them are held for each friction coefficient.",
+            cure="Average neighbouring readings, or leave out repeats.",
+        )
 
 
 def _readings(
@@ -351,7 +360,7 @@ def _readings(
     """Yield the name of each load, its readings of channels, and whether these share noise."""
     if isinstance(item, Scan):
         for single in single_loads(item):
-            count = len(channels) * int(measured_mask(single).sum())
+            count = len(channels) * measured_mask(single).sum()
             shared = len(channels) > 1 or single.u_zz_correlation is not None
             yield load_of(single), count, shared
         return
@@ -437,7 +446,7 @@ def compare_measured(
     channels = channels_of(measured, apparatus, families, (), between_scan_gain)
     fits = {loading: fit_friction(channel) for loading, channel in channels.items()}
     joint_fits = fits
-    if shear is not None and shear_families is not None:
+    if shear and shear_families:
         common = common_inputs(apparatus, shear)
         normal = channels_of(measured, apparatus, families, common, between_scan_gain)
         sheared = channels_of(measured, shear, shear_families, common, between_scan_gain)
@@ -447,20 +456,17 @@ def compare_measured(
 
     first = next(iter(channels.values()))
     frictionless = first.at(first.family.values[0])
-    differences = []
-    for pair in lubricated_pairs(measured.profiles):
-        difference = dry_against_lubricated(measured, frictionless, pair)
-        if difference is not None:
-            differences.append(difference)
+    pairs = lubricated_pairs(measured.profiles)
+    differences = (dry_against_lubricated(measured, frictionless, pair) for pair in pairs)
 
-    stated = measured.noise_stated
-    checks = (*measured.checks, *comparison_checks(loads, joint, noise_stated=stated))
+    own = comparison_checks(loads, joint, noise_stated=measured.noise_stated)
+    checks = (*measured.checks, *own)
     return FrictionComparison(
         measured=measured,
         friction=first.family.values,
         loads=loads,
         joint=joint,
-        dry_against_lubricated=tuple(differences),
+        dry_against_lubricated=tuple(filter(None, differences)),
         macroscopic=macroscopic,
         checks=checks,
         messages=comparison_messages(measured, families, joint, checks),
@@ -481,7 +487,7 @@ def channels_of(
     channels = {}
     for loading, family in families.items():
         sensor = sensor_of(apparatus, family, reach, measured.scans, common)
-        nearest = [np.abs(family.loads - load).argmin() for load in measured.loads]
+        nearest = [abs(family.loads - load).argmin() for load in measured.loads]
         channels[loading] = Channel(points, sensor, family.only(nearest))
     return channels
 
@@ -499,8 +505,9 @@ def _loads(
         profiles = {loading: load.by_profile for loading, load in by_loading.items()}
         profiles = with_loading(profiles, tested=tested)
         for loading, load in by_loading.items():
-            by_maximum = maxima[loading]
-            by_loading[loading] = replace(load, by_maximum=by_maximum, by_profile=profiles[loading])
+            by_loading[loading] = replace(
+                load, by_maximum=maxima[loading], by_profile=profiles[loading]
+            )
         loads.append(by_loading)
     return {loading: tuple(load[loading] for load in loads) for loading in fits}
 

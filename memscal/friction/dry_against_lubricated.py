@@ -74,9 +74,10 @@ def dry_against_lubricated(
     apart = replace(apart, flat=flat, correlation=correlation)
     nothing = np.zeros((1, noise.size))
     # Of what all scans share only the difference is left; the rest is each scan's own.
-    columns = {}
-    for source, column in dry_contact.columns.items():
-        columns[source] = column - lubricated_contact.columns[source]
+    columns = {
+        source: column - lubricated_contact.columns[source]
+        for source, column in dry_contact.columns.items()
+    }
     standardised = standardise(apart, Predicted(nothing, nothing, nothing, nothing, columns))
     _, (chi_square,) = log_likelihood(standardised.statistics)
 
@@ -116,7 +117,7 @@ def dry_against_lubricated(
 
 def _averaged(points: LoadPoints) -> LoadPoints:
     """Return the mean of the repeats at each position, sorted by position."""
-    rounded = np.round(points.offset, 12)
+    rounded = points.offset.round(12)
     order = np.argsort(rounded, kind="stable")
     places, starts, counts = np.unique(rounded[order], return_index=True, return_counts=True)
 
@@ -155,7 +156,7 @@ def _common_places(dry: FloatArray, lubricated: FloatArray) -> tuple[IndexArray,
     middles = (lubricated[1:] + lubricated[:-1]) / 2
     nearest = np.searchsorted(middles, dry)
     step = np.median(np.diff(dry)) if dry.size > 1 else 0.0
-    close = np.flatnonzero(np.abs(dry - lubricated[nearest]) < _CLOSE * step)
+    close = np.flatnonzero(abs(dry - lubricated[nearest]) < _CLOSE * step)
     matched, first = np.unique(nearest[close], return_index=True)
     return close[first], matched
 

@@ -143,7 +143,7 @@ def fit_friction(channel: Channel, *shear: Channel) -> FrictionFit:
     nodes = family.coordinates
     even = np.linspace(nodes[0], nodes[-1], _FINE)
     step = even[1] - even[0]
-    distances = np.abs(np.subtract.outer(even, nodes)).min(axis=1)
+    distances = abs(np.subtract.outer(even, nodes)).min(axis=1)
     between = unbounded(even[distances > 0.2 * step], family.scale)
     # The family's own values are kept as they are, not as their coordinates give them back.
     values = np.sort([*family.values, *between])
@@ -179,8 +179,7 @@ def half_normal_weights(values: FloatArray, width: float) -> FloatArray:
 
 def random_uncertainty(budget: Mapping[str, float]) -> float:
     """Return what noise, centre and baseline add to a measured maximum."""
-    parts = [u for source, u in budget.items() if source not in _SYSTEMATIC]
-    return math.hypot(*parts)
+    return math.hypot(*(u for source, u in budget.items() if source not in _SYSTEMATIC))
 
 
 def with_loading(by_loading: ByLoading, *, tested: bool) -> dict[str, BoundedEstimate]:
@@ -188,7 +187,7 @@ def with_loading(by_loading: ByLoading, *, tested: bool) -> dict[str, BoundedEst
 
     Where neither passes the chi-square, if it tests anything, nothing is left.
     """
-    estimates = list(by_loading.values())
+    estimates = by_loading.values()
     if tested and max(estimate.p_value for estimate in estimates) < FALSE_ALARM:
         return {
             loading: replace(
@@ -242,10 +241,10 @@ def fit_together(
     if held and lubricated_friction is not None and first == 0:
         for lubrication, chosen in indices.items():
             for loading, fit in fits.items():
-                estimate = fit.coefficient_beside(chosen, held, lubricated_friction)
-                joint[lubrication][loading] = estimate
-    tested = measured.noise_stated
-    return {kind: with_loading(held, tested=tested) for kind, held in joint.items()}
+                joint[lubrication][loading] = fit.coefficient_beside(
+                    chosen, held, lubricated_friction
+                )
+    return {kind: with_loading(held, tested=measured.noise_stated) for kind, held in joint.items()}
 
 
 def load_comparison(profile: MeasuredProfile, fit: FrictionFit, index: int) -> LoadComparison:

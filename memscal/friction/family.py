@@ -117,9 +117,8 @@ class ProfileFamily(FrozenArrays):
         changes = {source: arrays[:, 2 + i] for i, source in enumerate(self.changes)}
         numbers: Values = {}
         for name in _NUMBERS:
-            columns = getattr(self, name).T
-            interpolated = [np.interp(t, nodes, column) for column in columns]
-            numbers[name] = np.stack(interpolated, axis=1)
+            columns = [np.interp(t, nodes, column) for column in getattr(self, name).T]
+            numbers[name] = np.column_stack(columns)
         return replace(
             self,
             values=chosen,
@@ -132,7 +131,7 @@ class ProfileFamily(FrozenArrays):
 
     def only(self, loads_index: int | Sequence[int]) -> ProfileFamily:
         """Return the family at one or several of its loads, by index, in the order given."""
-        chosen = np.atleast_1d(np.asarray(loads_index, dtype=np.intp))
+        chosen = np.atleast_1d(loads_index)
         names = ["spectra", "by_load", *_NUMBERS]
         if self.slopes is not None:
             names.append("slopes")
@@ -148,7 +147,7 @@ class ProfileFamily(FrozenArrays):
         stack = np.stack([self.spectra, self.by_load, *self.changes.values()], axis=1)
         if self.values.size == 1:  # a constant
             return PPoly(stack[None], [0.0, 1.0])
-        return PchipInterpolator(self.coordinates, stack, axis=0)
+        return PchipInterpolator(self.coordinates, stack)
 
 
 #: Smaller steps of Poisson's ratio would show the rings' placing beside the change.
@@ -358,7 +357,7 @@ class FamilySetup:
 
             # By the logarithm of the length: t (1 - t) times that by the bounded coordinate t.
             t = bounded(*lengths)
-            slopes = PchipInterpolator(t, spectra, axis=0)(t, 1)
+            slopes = PchipInterpolator(t, spectra)(t, 1)
             by_length = (t * (1 - t))[:, None, None] * slopes
         # Changes by one stated standard uncertainty, by the scales of the contact, from derivatives
         # by the logarithms of load, wavenumber and length of the interface:
@@ -372,10 +371,11 @@ class FamilySetup:
             "thickness": (thicker, film.thickness, film.thickness_uncertainty),
             "indenter_radius": (larger, indenter.radius, indenter.radius_uncertainty),
         }
-        changes = {}
-        for source, (derivative, value, uncertainty) in stated.items():
-            if uncertainty is not None:
-                changes[source] = derivative * (uncertainty / value)
+        changes = {
+            source: derivative * (uncertainty / value)
+            for source, (derivative, value, uncertainty) in stated.items()
+            if uncertainty is not None
+        }
         if sides:
             upper, lower = (side["spectra"] for side in sides)
             slope = (upper - lower) / (ratios[0] - ratios[1])

@@ -70,10 +70,11 @@ class LoadPoints:
     @property
     def radius(self) -> FloatArray:
         """Distance from the centre, in m."""
-        return np.abs(self.offset)
+        return abs(self.offset)
 
     def shared_noise(self) -> tuple[IndexArray, Arrays]:
         """Order of the readings, and correlations (m, m) of kinds of noise in m that follow."""
+        places = self.places
         order = np.arange(self.u.size)
         shared = {}
         if self.correlation is not None:
@@ -81,13 +82,13 @@ class LoadPoints:
         if self.contacts is not None:
             shared["load_scatter"] = self.contacts @ self.contacts.T
             shared["position"] = shared["load_scatter"]
-        if self.places is not None:
-            readings = self.places.sum(axis=0)
+        if places is not None:
+            readings = places.sum(axis=0)
             most = int(readings.max())
             if shared or np.ptp(readings):
-                shared["position"] = self.places @ self.places.T
+                shared["position"] = places @ places.T
             elif most > 1:
-                order = np.argsort(self.places.argmax(axis=1), kind="stable")
+                order = np.argsort(places.argmax(axis=1), kind="stable")
                 shared["position"] = np.ones((most, most))
         return order, shared
 
@@ -122,7 +123,7 @@ def load_points(profile: MeasuredProfile, channel: str = "zz") -> LoadPoints:
             cure="Make it again with memscal apply, or give the scans.",
         )
     require_line(profile.label, profile.x, profile.y)
-    if points is None:
+    if not points:
         raise InputError(
             f"{profile.label}: the measured stress holds no usable voltage u_{channel}.",
             why="The scan has none, or it does not change, or the scan does not run along "
@@ -140,7 +141,7 @@ def load_points(profile: MeasuredProfile, channel: str = "zz") -> LoadPoints:
     drift = (position - middle) / (np.ptp(position) / 2)
     places = None
     if points.x_errors.any() and not profile.scan.position_errors_by_repeat:
-        places = _own(np.round(position, 12).tolist())
+        places = _own(position.round(12).tolist())
     return LoadPoints(
         u=points.u,
         offset=position - profile.centre[profile.axis],
@@ -149,7 +150,7 @@ def load_points(profile: MeasuredProfile, channel: str = "zz") -> LoadPoints:
         noise=points.noise / np.sqrt(points.weight),
         load_errors=points.load_errors / profile.load,
         x_errors=points.x_errors,
-        flat=np.stack([np.ones_like(position), drift], axis=1),
+        flat=np.column_stack([np.ones_like(position), drift]),
         load_share=(profile.load_uncertainty or 0.0) / profile.load,
         position_share=profile.scan.position_scale_uncertainty or 0.0,
         gain_share=profile.scan.gain_uncertainty or 0.0,
@@ -249,7 +250,8 @@ def sensor_of(
     # What the contacts' ``scans`` share with the calibration, film and load cell, counts once, as
     # do ``common`` inputs of the calibrations of two channels.
     nodes = family.wavenumbers
-    known = shared_changes(apparatus, scans, nodes.k)
+    k = nodes.k
+    known = shared_changes(apparatus, scans, k)
     shared = {name: change for name, change in known.items() if name in (*family.changes, "load")}
     alike = []
     if all(scan.stage.same_as(apparatus.stage) for scan in scans):
@@ -257,16 +259,16 @@ def sensor_of(
     # The sensor is the same, and so is its chain.
     if all(scan.gain_uncertainty is not None for scan in scans):
         alike.append("gain")
-    shared |= input_changes(apparatus, alike, nodes.k)
+    shared |= input_changes(apparatus, alike, k)
     inputs = [name for name in common if name not in shared]
-    calibration = input_changes(apparatus, inputs, nodes.k)
-    transfer, changes = sensor_changes(apparatus, nodes.k, [*shared, *calibration])
+    calibration = input_changes(apparatus, inputs, k)
+    transfer, changes = sensor_changes(apparatus, k, [*shared, *calibration])
     shared |= {f"calibration_{name}": change for name, change in calibration.items()}
     if changes.shape[1]:
         # Any rotation of independent changes is another set of them: in this one few matter.
         radii = np.linspace(0.0, reach, _RADII)
         middle = family.spectra[family.values.size // 2]
-        largest = np.abs(middle).max(axis=1) if family.order else middle[:, 0]
+        largest = abs(middle).max(axis=1) if family.order else middle[:, 0]
         signals = [
             nodes.synthesise(shape[:, None] * changes, radii, order=family.order)
             for shape in middle / largest[:, None]
@@ -350,11 +352,10 @@ def stacked(normal: Readings, shear: Readings) -> Readings:
 
     def joined(pair: Sequence[Any], names: Sequence[str], axis: int) -> Values:
         """Arrays of both channels, one after the other."""
-        arrays = {}
-        for name in names:
-            both = [getattr(channel, name) for channel in pair]
-            arrays[name] = np.concatenate(both, axis=axis)
-        return arrays
+        return {
+            name: np.concatenate([getattr(channel, name) for channel in pair], axis=axis)
+            for name in names
+        }
 
     correlations = []
     contacts = []
@@ -363,7 +364,7 @@ def stacked(normal: Readings, shear: Readings) -> Readings:
         correlations.append(own)
         # A contact is known by its place, and by which of those there it is.
         count: Counter[float] = Counter()
-        for place in np.round(channel.offset, 12).tolist():
+        for place in channel.offset.round(12).tolist():
             contacts.append((place, count[place]))
             count[place] += 1
     names = ("u", "offset", "log_load", "noise", "load_errors", "x_errors")
@@ -375,17 +376,17 @@ def stacked(normal: Readings, shear: Readings) -> Readings:
         contacts=_own(contacts),
     )
     if points[0].places is not None:
-        together = replace(together, places=_own(np.round(together.offset, 12).tolist()))
+        together = replace(together, places=_own(together.offset.round(12).tolist()))
     columns = [dict(channel.columns) for channel in predicted]
     if "apparatus" in columns[1]:
         columns[1]["apparatus_shear"] = columns[1].pop("apparatus")
     padded = {}
     for source in dict.fromkeys([*columns[0], *columns[1]]):
         width = next(changes[source].shape[-1] for changes in columns if source in changes)
-        both = []
-        for reading, changes in zip(predicted, columns, strict=True):
-            absent = np.zeros((*reading.signal.shape, width))
-            both.append(changes.get(source, absent))
+        both = [
+            changes.get(source, np.zeros((*reading.signal.shape, width)))
+            for reading, changes in zip(predicted, columns, strict=True)
+        ]
         padded[source] = np.concatenate(both, axis=1)
     arrays = joined(predicted, ("signal", "by_load", "by_coordinate", "slope"), axis=1)
     return together, Predicted(**arrays, columns=padded)
@@ -397,7 +398,7 @@ class Noise:
 
     kinds: Arrays  # (V, n): standard deviations in V
     # (m, m): correlation of kinds within each m readings that follow each other, if there is any.
-    shared: Arrays = field(default_factory=dict)
+    shared: Arrays
 
     def inverse_root(self) -> FloatArray:
         """Return W, with W N W^T = 1, in B blocks of readings that share noise: (V, B, m, m)."""
@@ -479,7 +480,7 @@ def standardise(points: LoadPoints, predicted: Predicted) -> Standardised:
     scaled = whitened(np.concatenate(vectors, axis=-1))
     projected = scaled - basis @ (np.swapaxes(basis, -1, -2) @ scaled)
     # The diagonals of triangular roots give the determinants.
-    pivots = np.abs(np.diagonal(triangle, axis1=-2, axis2=-1))
+    pivots = abs(np.diagonal(triangle, axis1=-2, axis2=-1))
     log_flat = 2 * np.log(pivots).sum(axis=-1)
     pivots = np.diagonal(root, axis1=-2, axis2=-1)
     log_noise = -2 * np.log(pivots).sum(axis=(-2, -1))

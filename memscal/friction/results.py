@@ -108,11 +108,12 @@ class BoundedEstimate:
     @property
     def kind(self) -> str:
         """What the data tell: value, interval without a value, lower or upper bound, or nothing."""
-        if math.isnan(self.interval.low):
+        low = self.interval.low
+        if math.isnan(low):
             return UNEXPLAINED
         if self.interval.high is None:
-            return LOWER_BOUND if self.interval.low > 0 else UNKNOWN
-        if self.interval.low <= 0 and (self.value is None or self.value <= 0):
+            return LOWER_BOUND if low > 0 else UNKNOWN
+        if low <= 0 and (self.value is None or self.value <= 0):
             return UPPER_BOUND
         return INTERVAL if self.value is None else VALUE
 

@@ -44,8 +44,7 @@ def wrong_inputs(
 
     family = channel.family
     loading = family.loading
-    lowest = family.loads.min() / _FARTHEST
-    loads = np.geomspace(lowest, family.loads.max() * _FARTHEST, _LOADS)
+    loads = np.geomspace(family.loads.min() / _FARTHEST, family.loads.max() * _FARTHEST, _LOADS)
     film = replace(setting["film"].expected, poisson_ratio_uncertainty=None)
     changed = {**setting, "film": film, "loads": loads, "derivatives": False}
     solved = amontons_family(friction=family.values.tolist(), loading=loading, **changed)

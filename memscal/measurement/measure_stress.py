@@ -321,7 +321,7 @@ def _profile_messages(
 ) -> Iterator[Message]:
     """Yield the messages of one load; ``noise``: where it was estimated, in V."""
     if noise is not None:
-        yield restore.noise_unstated_message(scan.reading.text(float(noise.min())))
+        yield restore.noise_unstated_message(scan.reading.text(noise.min()))
     yield from record_messages(scan)
     if scan.normal_load is not None and scan.normal_load_errors is None:
         yield Message(

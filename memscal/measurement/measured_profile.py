@@ -101,7 +101,7 @@ def _signals_of_path(loads: Sequence[Scan], apparatus: ApparatusFunction) -> lis
         spectra = []
         for path in paths:
             spectra += [transfer * path[i].base_spectrum(nodes.k) for i in three]
-        voltages = nodes.synthesise(np.stack(spectra, axis=1), r).T
+        voltages = nodes.synthesise(np.column_stack(spectra), r).T
         voltages = voltages.reshape(-1, near.size, r.size)
         # Without friction both are the frictionless contact.
         below, at, above = np.moveaxis(voltages[[0, -1]], 1, 0)
@@ -141,12 +141,11 @@ def require_points(scan: Scan, signal: ContactSignal) -> None:
         return
     order = np.argsort(scan.x)
     x = scan.x[order]
-    measured = complete.reshape(-1, scan.x.size)[:, order].any(axis=0)
-    places = np.flatnonzero(measured)
+    places = np.flatnonzero(complete.reshape(-1, scan.x.size)[:, order].any(axis=0))
     missing = np.diff(places) - 1
     gaps = np.where(missing > 0, np.diff(x[places]), 0.0)
     if gaps.size and gaps.max() > signal.contact_radius:
-        i = int(np.argmax(gaps))
+        i = np.argmax(gaps)
         first = x[places[i] + 1]
         last = x[places[i + 1] - 1]
         raise InputError(
@@ -169,7 +168,7 @@ def require_ends(scan: Scan, signal: ContactSignal, centre: FloatArray) -> None:
     for axis, middle in axes:
         ends += np.abs([axis.min() - middle, axis.max() - middle]).tolist()
     calculated = signal.voltage[0]
-    left = float(np.interp(ends, signal.r, calculated).max() / calculated.max())
+    left = np.interp(ends, signal.r, calculated).max() / calculated.max()
     if left > _LARGEST_END:
         raise FitError(
             f"{load_of(scan)}: the scan ends {min(ends) * 1e3:.3g} mm from its centre, "
@@ -248,7 +247,7 @@ def prepared_scan(scan: Scan, apparatus: ApparatusFunction, signal: ContactSigna
         found = find(level, apparatus)
         distance = np.hypot(x - found.centre[0], y - found.centre[1])
         slope = np.interp(distance, signal.r, _slope(signal, found))
-        load_noise = np.abs(slope) * load_share
+        load_noise = abs(slope) * load_share
         electronic = stated
         if scan.u_zz_errors is None and load_noise.any():
             noise = _electronic_noise(found, load_noise[np.isfinite(level.u_zz)])
@@ -278,7 +277,7 @@ def _with_noise(scan: Scan, electronic: FloatArray, load_noise: FloatArray) -> S
     correlation = scan.u_zz_correlation
     if correlation is not None:
         # The scatter of the loads is independent: it takes its share from the correlation.
-        shape = (-1, correlation.shape[0])
+        shape = (-1, len(correlation))
         electronic_variance = np.nanmean(electronic.reshape(shape) ** 2, axis=0)
         variance = np.nanmean(total.reshape(shape) ** 2, axis=0)
         correlation = _scaled(correlation, np.sqrt(electronic_variance / variance))
@@ -302,8 +301,8 @@ def _electronic_noise(found: _Found, load_noise: FloatArray) -> float:
     residual = found.residual
     # The fitted parameters lower the scatter of the residuals.
     square = found.weight * residual**2 * residual.size / max(residual.size - found.parameters, 1)
-    scatter = 1.4826 * np.median(np.abs(residual))
-    tried = np.maximum(_TRIED * scatter, NUMERICAL_FLOOR * np.abs(found.signal).max())
+    scatter = 1.4826 * np.median(abs(residual))
+    tried = np.maximum(_TRIED * scatter, NUMERICAL_FLOOR * abs(found.signal).max())
     variance = tried[:, None] ** 2 + load_noise**2
     deviance = np.sum(np.log(variance) + square / variance, axis=1)
     return float(tried[np.argmin(deviance)])
@@ -351,21 +350,20 @@ def measured_profile(
     r = np.hypot(x - restored.centre[0], y - restored.centre[1])
     order = np.argsort(r, kind="stable")
     background = posterior.estimate.model.drift_columns @ posterior.drift
-    averaged = average @ (restored.points.u - background)
-    s_zz = averaged[order] / a
     average = average[order]
+    s_zz = average @ (restored.points.u - background) / a
     decorrelation = restored.points.decorrelation
-    if decorrelation is None:
-        noise_root = np.sqrt(average.power(2) @ noise**2)
-    else:
+    if decorrelation:
         # Of repeats there are more columns than positions.
         correlated = noise[:, None] * decorrelation.correlate(np.eye(noise.size))
         noise_root = np.linalg.qr((average @ correlated).T)[1].T
+    else:
+        noise_root = np.sqrt(average.power(2) @ noise**2)
     u_a = restored.apparatus.parameters.uncertainty("conversion_constant")
     roots = {"noise": noise_root / a, "conversion_constant": u_a / a * s_zz[:, None]}
     roots |= _place_roots(restored, average)
     maximum, budget = _on_axis(restored)
-    curve_r = np.linspace(0.0, float(r[order][-1]), 301)
+    curve_r = np.linspace(0.0, r[order][-1], 301)
     return MeasuredProfile(
         scan=origin,
         load=scan.stated_load,
@@ -405,8 +403,9 @@ def _points(scan: Scan, noise: FloatArray, restored: Restoration) -> Mapping[str
             # The normal stress does not need it; a comparison of the shear states what is missing.
             with suppress(InputError, FitError):
                 shear = measured_points(scan, channel)
-                ones = np.ones_like(shear.u)
-                points[channel] = _channel_points(scan, shear, shear.u_errors, ones)
+                points[channel] = _channel_points(
+                    scan, shear, shear.u_errors, np.ones_like(shear.u)
+                )
     return points
 
 
@@ -417,7 +416,7 @@ def _channel_points(
     if scan.normal_load_errors is not None:
         load_errors = np.nan_to_num(scan.normal_load_errors[measured_mask(scan, points.channel)])
     correlation = None
-    if points.decorrelation is not None:
+    if points.decorrelation:
         root = points.decorrelation.correlate(np.eye(points.u.size))
         correlation = root @ root.T
     return MeasuredPoints(
@@ -440,7 +439,7 @@ def _place_roots(restored: Restoration, average: Any) -> Arrays:
     film = film_transfer(restored.scan.set_up.expected, model.reference.wavenumbers)
     pressure = posterior.stress / restored.scan.stated_load / film
     a = restored.apparatus.conversion_constant
-    geometry = model.geometry(np.atleast_2d(restored.centre))
+    geometry = model.geometry(restored.centre)
     by_centre = average @ model.centre_derivative(geometry, pressure) / a
     by_drift = average @ model.drift_columns / a
     covariance = posterior.covariance[posterior.nodes :, posterior.nodes :]
@@ -476,7 +475,7 @@ def _on_axis(restored: Restoration) -> tuple[float, Mapping[str, float]]:
         by_kernel = on_axis * posterior.stress @ by_kernel / apparatus.conversion_constant
         changes[source] = changes[source] + by_kernel
     variance = row @ posterior.covariances["scan"][:nodes, :nodes] @ row
-    budget = {"noise": float(np.sqrt(max(variance, 0.0)))}
+    budget = {"noise": math.sqrt(max(variance, 0.0))}
     for source, change in changes.items():
         budget[source] = float(np.linalg.norm(change))
     return float(row @ posterior.stress), budget

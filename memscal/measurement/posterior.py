@@ -195,7 +195,7 @@ def _averaged_departures(start: ProfileEstimate, weighing: Weighing) -> _Pressur
 def _averaged_shapes(scan: Scan, start: ProfileEstimate) -> _PressureEstimate:
     """Average the shapes by their marginal likelihood; their spread counts as uncertainty."""
     weighed = weighed_shapes(pressure_shapes(scan.set_up.film), start)
-    log_marginal = np.array([weighing.log_marginal_likelihoods[0] for weighing in weighed])
+    log_marginal = np.array([weighing.evidence for weighing in weighed])
     weight = np.exp(log_marginal - log_marginal.max())
     kept = np.flatnonzero(weight >= _NEGLIGIBLE)
     fits = [_averaged_departures(start, weighed[i]) for i in kept]
@@ -214,7 +214,7 @@ def _averaged_shapes(scan: Scan, start: ProfileEstimate) -> _PressureEstimate:
 
 def weighed_shapes(shapes: Sequence[PressureShape], start: ProfileEstimate) -> list[Weighing]:
     """Fit the shapes, and weigh departures from each fit."""
-    count = float(start.outlier_weight.sum())
+    count = start.outlier_weight.sum()
     weighed = []
     for shape, fit in zip(shapes, fitted_shapes(shapes, start), strict=True):
         about = departure_basis(fit)
@@ -252,12 +252,12 @@ def fitted_shapes(shapes: Sequence[PressureShape], start: ProfileEstimate) -> li
         forces, steps, *_ = (inverse @ data).T
         # A step that turns back is half as long as the last, so that no width swings for ever.
         ahead = steps * width / widths
-        longest = np.where(ahead * growth < 0, np.abs(growth) / 2, _LONGEST)
+        longest = np.where(ahead * growth < 0, abs(growth) / 2, _LONGEST)
         growth = np.clip(ahead, -longest, longest)
         widths = widths * (1 + growth)
-        if np.abs(ahead).max() < _SETTLED:
+        if abs(ahead).max() < _SETTLED:
             break
-    settled = (forces > 0) & (np.abs(ahead) < _SETTLED)
+    settled = (forces > 0) & (abs(ahead) < _SETTLED)
     settled &= (widths > width / _FARTHEST) & (widths < width * _FARTHEST)
     forces = np.where(settled, forces, force)
     widths = np.where(settled, widths, width)
@@ -358,7 +358,7 @@ def posterior_of(
     wavenumbers = model.reference.wavenumbers
     set_up = scan.set_up.expected
     film = film_transfer(set_up, wavenumbers)
-    scale = np.concatenate([scan.stated_load * film, np.ones(mean.size - nodes)])
+    scale = np.append(scan.stated_load * film, np.ones(mean.size - nodes))
     film_changes = _film_changes(set_up, wavenumbers)
     shared = shared_changes(apparatus, [scan], model.k)
     # One error of a film that sensor and contact share changes A G and the film's transfer.
@@ -387,7 +387,7 @@ def posterior_of(
     variance = sum(np.diag(covariance)[:nodes] for covariance in covariances.values())
     gaussian = scan.stated_load * film * gaussian_transfer(model.k, estimate.gaussian.sigma)
     lost = _RESOLVED * np.sqrt(np.maximum(variance, 0.0)) > gaussian
-    resolved = model.k[int(np.argmax(lost)) if lost.any() else -1]
+    resolved = model.k[np.argmax(lost) if lost.any() else -1]
     return Posterior(
         estimate=estimate,
         state=scale * mean,
@@ -396,7 +396,7 @@ def posterior_of(
         changes=changes,
         film_inputs=names,
         nodes=nodes,
-        first_drift=nodes + int(estimate.points.free.sum()),
+        first_drift=nodes + estimate.points.free.sum(),
         residual=averaged.residual,
         found_noise=averaged.noise,
         noise_ratio=estimate.adopted_noise(averaged.noise) / estimate.noise_scale,
@@ -445,7 +445,7 @@ def shared_changes(
     """
     known = apparatus.film
     names = list[str]()
-    if known is not None and all(scan.film and alike_films(scan.film, known) for scan in scans):
+    if known and all(scan.film and alike_films(scan.film, known) for scan in scans):
         names += _FILM_PROPERTIES
     if all(scan.load_cell.same_as(apparatus.load_cell) for scan in scans):
         names.append("load")
@@ -472,9 +472,10 @@ def _kernel_changes(
 
 def common_inputs(apparatus: ApparatusFunction, other: ApparatusFunction) -> list[str]:
     """Return the inputs that the calibrations of two channels by one rod scan have in common."""
-    scans = set()
-    for one in (apparatus, other):
-        scans.add((one.film, one.indenter, one.load, one.load_cell, one.process.input_scan))
+    scans = {
+        (one.film, one.indenter, one.load, one.load_cell, one.process.input_scan)
+        for one in (apparatus, other)
+    }
     if len(scans) > 1:
         return []
     return [name for name in apparatus.kernel_changes if name in other.kernel_changes]
@@ -496,12 +497,13 @@ def _sensor_changes(
 ) -> ArrayPair:
     """Return transfer function and changes, which all profiles of one sensor share."""
     profile = apparatus.radial_profile
+    g = profile.g
     a = apparatus.conversion_constant
     u_a = apparatus.parameters.uncertainty("conversion_constant")
-    covariance = a**2 * profile.g_covariance + np.outer(profile.g, profile.g) * u_a**2
+    covariance = a**2 * profile.g_covariance + np.outer(g, g) * u_a**2
     if profile.conversion_correlation is not None:
         shared = a * u_a * profile.conversion_correlation * profile.g_errors
-        covariance = covariance + np.outer(shared, profile.g) + np.outer(profile.g, shared)
+        covariance = covariance + np.outer(shared, g) + np.outer(g, shared)
     for name in without:
         change = a * apparatus.kernel_changes[name]
         covariance = covariance - np.outer(change, change)
@@ -510,7 +512,7 @@ def _sensor_changes(
     values, vectors = np.linalg.eigh(covariance * np.outer(ring, ring))
     uncertain = values > max(_EXACT * values[-1], 0.0)
     roots = vectors[:, uncertain] * np.sqrt(values[uncertain])
-    table = np.column_stack([profile.g, roots / ring[:, None]])
+    table = np.column_stack([g, roots / ring[:, None]])
     transforms = hankel_transform(profile.r, table, np.frombuffer(nodes))
     return transforms[:, 0], transforms[:, 1:]
 

@@ -215,8 +215,9 @@ class Restoration(Result, Checked):
         A stated noise is used as it is, with what uncertain positions add to it.
         """
         estimate = self.posterior.estimate
-        stated = self.points.u_errors is not None
-        noise = estimate.noise / estimate.noise_scale if stated else self.noise
+        noise = self.noise
+        if self.points.noise_stated:
+            noise = estimate.noise / estimate.noise_scale
         return float(np.sum(estimate.outlier_weight * (self.residual / noise) ** 2))
 
     @property
@@ -270,13 +271,14 @@ class Restoration(Result, Checked):
 
         Of the centre only the coordinates that the scan determines: shape (4, 4) or (5, 5).
         """
-        nodes = self.posterior.nodes
-        first_drift = self.posterior.first_drift
-        rows = np.zeros((2 + first_drift + 1 - nodes, self.posterior.state.size))
+        posterior = self.posterior
+        nodes = posterior.nodes
+        first_drift = posterior.first_drift
+        rows = np.zeros((2 + first_drift + 1 - nodes, posterior.state.size))
         rows[0, :nodes] = self._at_zero
         rows[1, :nodes] = self._synthesis(0.0)
         rows[2:, nodes : first_drift + 1] = np.eye(first_drift + 1 - nodes)
-        return rows @ self.posterior.covariance @ rows.T
+        return rows @ posterior.covariance @ rows.T
 
     @property
     def _at_zero(self) -> FloatArray:
@@ -291,7 +293,7 @@ class Restoration(Result, Checked):
 
     def _synthesis(self, r: ArrayLike) -> FloatArray:
         """Matrix from the transform at the nodes to values at radii."""
-        radii = np.abs(floats(r))
+        radii = abs(floats(r))
         reach = reach_of(self.points)
         if not np.all(radii <= reach):
             raise InputError(
@@ -320,8 +322,8 @@ def _compared(restored: Restoration, stress: BaseStress) -> StressComparison:
     else:
         spectrum = hankel_transform(stress.r, stress.sigma_zz, wavenumbers.k) / stress.load
     calculated = scan.stated_load * wavenumbers.synthesise(spectrum, restored.r)
-    peak = float(np.abs(calculated).max())
-    apart = np.abs(restored.sigma_zz - calculated)
+    peak = abs(calculated).max()
+    apart = abs(restored.sigma_zz - calculated)
     chi_square, degrees = _direct(restored, spectrum)
     return StressComparison(
         stress=stress,
@@ -345,7 +347,7 @@ def _direct(restored: Restoration, spectrum: FloatArray) -> tuple[float, int]:
     points = estimate.points
     model = estimate.model
     # Repeats share the centre, which is zero across a line.
-    geometry = model.geometry(np.atleast_2d(restored.centre))
+    geometry = model.geometry(restored.centre)
     pressure = spectrum / film_transfer(scan.set_up.expected, model.reference.wavenumbers)
     signal = model.signal(geometry, pressure)
     # One load cell errs alike under the rod, which changes A, and under the contact.
@@ -355,7 +357,7 @@ def _direct(restored: Restoration, spectrum: FloatArray) -> tuple[float, int]:
     shifts = (posterior.shifts["apparatus"], posterior.shifts["position_scale"], by_load)
     # The stated noise as it is: raised by a misfit, it would hide it.
     noise = posterior.noise_ratio * estimate.noise_scale
-    if points.u_errors is not None:
+    if points.noise_stated:
         noise = 1.0
     weights = estimate.weights / noise**2
     points, _ = points.sharing(points.standardised(np.hstack(shifts), weights))

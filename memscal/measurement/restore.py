@@ -74,7 +74,7 @@ def single_loads(scan: Scan) -> tuple[Scan, ...]:
     passes = scan.passes
     if scan.kind != "repeats" and not passes.any():
         return (replace(scan, load=_line_load(scan, scan.normal_load, "")),)
-    lines = range(int(passes.max()) + 1)
+    lines = range(passes.max() + 1)
     loads = np.array(
         [_line_load(scan, scan.normal_load[passes == i], f", line {i + 1}") for i in lines]
     )
@@ -102,7 +102,7 @@ def scan_at_load(scan: Scan, load: float) -> Scan:
 
 def place_of(scan: Scan) -> str:
     """Name a scan's file, for messages."""
-    return "The scan" if scan.source is None else scan.source.file_name
+    return scan.source.file_name if scan.source else "The scan"
 
 
 def load_of(scan: Scan) -> str:
@@ -120,7 +120,7 @@ def _line_load(scan: Scan, loads: FloatArray, line: str) -> float:
             cure="State the loads, or leave normal_load out where there is one nominal load only.",
         )
     load = float(np.median(recorded))
-    if np.abs(recorded - load).max() > _SCATTER * load:
+    if abs(recorded - load).max() > _SCATTER * load:
         raise InputError(
             f"{place_of(scan)}{line}: its loads go from {recorded.min():.4g} to "
             f"{recorded.max():.4g} N.",
@@ -259,7 +259,7 @@ def _checks(restored: Restoration) -> Iterator[QualityCheck]:
     yield _symmetry(restored)
     yield outlier_check(restored.posterior.estimate.outlier_weight, "the residuals")
     compared = restored.comparison
-    if compared is not None:
+    if compared:
         yield check(
             "expected_stress",
             compared.chi_square,
@@ -283,7 +283,7 @@ def force_less_load(
 
 
 def _noise(restored: Restoration) -> Iterator[QualityCheck]:
-    if restored.points.u_errors is None:
+    if not restored.points.noise_stated:
         return
     residuals = residuals_of(restored.posterior.estimate)
     yield noise_check(scatter_of_means(residuals, restored.posterior.found_noise))
@@ -325,7 +325,7 @@ def _messages(restored: Restoration, checks: Sequence[QualityCheck]) -> Iterator
     yield from failed_calibration_messages(restored.apparatus)
     yield from point_messages(restored.posterior.estimate)
     yield from record_messages(restored.scan)
-    if restored.points.u_errors is None:
+    if not restored.points.noise_stated:
         yield noise_unstated_message(restored.points.reading.text(restored.noise.min()))
     if not restored.apparatus.radial_profile.g_errors.any():
         yield Message(
@@ -344,8 +344,10 @@ def _messages(restored: Restoration, checks: Sequence[QualityCheck]) -> Iterator
 def failed_calibration_messages(apparatus: ApparatusFunction) -> Iterator[Message]:
     """Say that a check of the calibration had failed, if one had."""
     if not apparatus.passed:
-        text = f"Quality checks of the calibration itself {state_of_checks(apparatus.checks)}."
-        yield Message(FAILED_CALIBRATION, text)
+        yield Message(
+            FAILED_CALIBRATION,
+            f"Quality checks of the calibration itself {state_of_checks(apparatus.checks)}.",
+        )
 
 
 def noise_unstated_message(noise: str) -> Message:

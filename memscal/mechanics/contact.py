@@ -130,7 +130,7 @@ class Contact(Result):
         At ``k`` in rad/m, of any shape and sign:
         :math:`2\pi\int\sigma_{zz}\,J_0(kr)\,r\,dr`, which is the load at k = 0.
         """
-        return self.inside.spectrum(np.abs(floats(k)), 0)
+        return self.inside.spectrum(abs(floats(k)), 0)
 
     def base_shear(self, r: ArrayLike) -> FloatArray:
         r"""Return the radial traction of the base on the film, in Pa, positive outward.
@@ -147,7 +147,7 @@ class Contact(Result):
         :meth:`base_shear`, which is odd in k and zero at k = 0.
         """
         signed = floats(k)
-        return np.sign(signed) * self.inside.spectrum(np.abs(signed), 1)
+        return np.sign(signed) * self.inside.spectrum(abs(signed), 1)
 
     def interface_pressure(self, r: ArrayLike) -> FloatArray:
         """Return the pressure between indenter and film in Pa; zero outside the contact.
@@ -185,7 +185,7 @@ class Contact(Result):
     def mesh(self) -> FieldMesh:
         """Return displacement and stress in the whole film, on the mesh of its finite elements."""
         mesh: Callable[[], FieldMesh] | None = getattr(self.inside, "mesh", None)
-        if mesh is None:
+        if not mesh:
             raise InputError(
                 f'A contact that was solved with backend="{self.backend}" has no mesh.',
                 cure='Press the indenter with backend="fem".',
@@ -223,8 +223,8 @@ class Contact(Result):
     def _default_profile(self) -> StressProfile:
         near = np.arange(0.0, self.contact_radius / self.film.thickness + _NEAR_REACH, _NEAR_STEP)
         far = near[-1] + np.arange(_FAR_STEP, _FAR_REACH - _NEAR_REACH, _FAR_STEP)
-        radii = np.concatenate([near, far]) * self.film.thickness
-        sigma_zz = np.abs(self.base_stress(radii))
+        radii = np.append(near, far) * self.film.thickness
+        sigma_zz = abs(self.base_stress(radii))
         last = np.flatnonzero(sigma_zz >= _PROFILE_FLOOR * sigma_zz.max())[-1] + 2
         return self.profile(radii[:last])
 

@@ -253,7 +253,7 @@ def hat_transform(ring_bytes: bytes, k_bytes: bytes, order: int) -> FloatArray:
     # Gauss nodes between the rings, enough for the largest wavenumber in the widest gap.
     count = 4 + math.ceil(0.7 * (k.max() * widths.max()))
     s, weights = gauss_between(rings, count)
-    waves = bessel(order, np.multiply.outer(k, s)) * (weights * s)
+    waves = bessel(order, np.outer(k, s)) * (weights * s)
     waves = waves.reshape(k.size, widths.size, count)
     rising, _ = gauss_panels(1.0, 1.0, count)
     right = waves @ rising
@@ -334,7 +334,7 @@ def _displacements(
     scale = (1 - nu) / film.shear_modulus
     beta = half_space_coupling(nu)
     by_normal, coupling, by_radial = corrections(k * film.thickness, nu)
-    normal, radial = (bessel(order, np.multiply.outer(x, k)) * weights for order in (0, 1))
+    normal, radial = (bessel(order, np.outer(x, k)) * weights for order in (0, 1))
     return (
         scale * (half_space[0] + (normal * by_normal) @ p),
         scale * (beta * half_space[1] + (normal * coupling) @ q),

@@ -162,9 +162,11 @@ def indent(
                 cure='Use backend="fem" for a film with a free edge.',
             )
     if (load is None) == (depth is None):
-        problem = "Give either a load or a depth" + (", not both." if load is not None else ".")
-        raise InputError(problem, why="One follows from the other.")
-    values = np.asarray(load if depth is None else depth, dtype=np.float64)
+        raise InputError(
+            "Give either a load or a depth" + (", not both." if load is not None else "."),
+            why="One follows from the other.",
+        )
+    values = np.asarray(load if depth is None else depth, np.float64)
     if values.ndim > 1 or values.size == 0:
         raise InputError(f"The loads or depths have shape {values.shape}; give a flat list.")
     for value in values.flat:
@@ -178,7 +180,7 @@ def indent(
     )
     slides_or_sticks = friction == 0 or math.isinf(friction)
     # Without friction there is nothing for a slip length to act on.
-    rigid = interface.rigid or (friction == 0 and interface.normal_law is None)
+    rigid = interface.rigid or (friction == 0 and not interface.normal_law)
     if strain == "finite":
         contacts = hook("press_at_finite_strain")(request)
     elif isinstance(indenter, Rod) and slides_or_sticks and rigid and backend == "hankel":
@@ -212,22 +214,23 @@ def changes_by_inputs(contact: Contact) -> list[tuple[Contact, Contact, float]]:
 
 def _rod_contact(film: ElasticFilm, rod: Rod, target: Target, friction: float) -> Contact:
     """Return the solution in spherical Bessel functions."""
+    radius = rod.radius
     sticking = math.isinf(friction)
-    solution = solve_rod(rod.radius / film.thickness, film.poisson_ratio, sticking=sticking)
-    stiffness = 2 * film.contact_modulus * rod.radius * solution.stiffness_factor
+    solution = solve_rod(radius / film.thickness, film.poisson_ratio, sticking=sticking)
+    stiffness = 2 * film.contact_modulus * radius * solution.stiffness_factor
     load = target.value if isinstance(target, Load) else target.value * stiffness
     depth = target.value if isinstance(target, Depth) else target.value / stiffness
     if depth >= film.thickness:
         raise too_deep(film, rod, load, depth)
     terms = solution.pressure_terms.size
-    traction = solution.traction(rod.radius, load)
+    traction = solution.traction(radius, load)
     return Contact(
         film=film,
         indenter=rod,
         load=load,
         depth=depth,
-        contact_radius=rod.radius,
-        stick_radius=rod.radius if sticking else 0.0,
+        contact_radius=radius,
+        stick_radius=radius if sticking else 0.0,
         friction=friction,
         loading="",
         backend="hankel",

@@ -186,7 +186,7 @@ class Interface:
     @property
     def normal_law(self) -> NormalLaw | None:
         """The normal law, or ``None`` where it is rigid."""
-        return self.normal if self.normal is not None and self.normal.length > 0 else None
+        return self.normal if self.normal and self.normal.length > 0 else None
 
     @property
     def description(self) -> str:
@@ -199,7 +199,7 @@ class Interface:
                 f"{law.asperity_density * 1e-6:.4g} asperities per mm^2 of radius "
                 f"{law.asperity_radius * 1e6:.4g} um)"
             )
-        elif law is not None:
+        elif law:
             compliances.append(
                 f"exponential law (length {law.decay_length * 1e6:.4g} um, "
                 f"{law.reference_pressure * 1e-6:.4g} MPa where mean planes meet)"
@@ -211,7 +211,7 @@ class Interface:
     @property
     def rigid(self) -> bool:
         """Whether nothing yields."""
-        return self.normal_law is None and self.slip_length == 0
+        return not self.normal_law and self.slip_length == 0
 
 
 @lru_cache(maxsize=1)

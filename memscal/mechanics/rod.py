@@ -68,7 +68,7 @@ def spherical_bessel(count: int, x: FloatArray) -> FloatArray:
         below = (2 * order + 1) / x * current - above
         above = current
         current = below
-        size = np.abs(current)
+        size = abs(current)
         if np.max(size, initial=0.0) > 1e100:
             scale = 1 / np.maximum(size, 1.0)
             above = above * scale
@@ -106,7 +106,7 @@ class RodTraction:
         _, m, under, scale = self._inside(r)
         # c_n = sqrt(pi) n! / Gamma(n + 1/2) gives each term the transform j_2n.
         series = _series(self.pressure_terms * _term_scale(self.pressure_terms.size), 0)
-        return np.where(under, (legendre.legval(m, series) / m) * scale, 0.0)
+        return np.where(under, legendre.legval(m, series) / m * scale, 0.0)
 
     def shear(self, r: FloatArray) -> FloatArray:
         """Return the radial traction at ``r`` (m) in Pa; zero from the edge outward."""
@@ -241,7 +241,7 @@ def _solve(ratio: float, nu: float, sticking: bool, terms: int, order: int) -> R
         coupling = half_space_coupling(nu) * products
         coupling += (even * (weights * by_coupling)) @ odd.T
         matrix = np.block([[matrix, coupling], [coupling.T, radial]])
-    solution = np.linalg.solve(matrix, np.eye(1, matrix.shape[0])[0])
+    solution = np.linalg.solve(matrix, np.eye(1, len(matrix))[0])
     scaled = solution / solution[0]
     scaled.setflags(write=False)
     return RodSolution(float(np.pi / 2 * solution[0]), scaled[:terms], scaled[terms:], np.nan)
@@ -254,7 +254,7 @@ def _largest_change(fine: RodSolution, coarse: RodSolution, ratio: float, nu: fl
     film = ElasticFilm(young_modulus=2.0**20, poisson_ratio=nu, thickness=h)
     r = h * np.linspace(0.0, ratio + 4.0, 60)
     new, old = (base_stress(film, rod.traction(h * ratio, 1.0), r) for rod in (fine, coarse))
-    by_stress = np.max(np.abs(new - old)) / np.max(np.abs(new))
+    by_stress = np.max(abs(new - old)) / np.max(abs(new))
     return float(max(by_stress, abs(fine.stiffness_factor / coarse.stiffness_factor - 1)))
 
 

@@ -75,8 +75,8 @@ class FilmField(Protocol):
 def anticlockwise(points: FloatArray, triangles: IndexArray) -> IndexArray:
     """Return quadratic triangles (m, 6) of points (n, 2) with their nodes anticlockwise."""
     first, second, third = np.moveaxis(points[triangles[:, :3]], 1, 0)
-    (x, y) = (second - first).T
-    (u, v) = (third - first).T
+    x, y = (second - first).T
+    u, v = (third - first).T
     return np.where((x * v < u * y)[:, None], triangles[:, [0, 2, 1, 5, 4, 3]], triangles)
 
 
@@ -97,7 +97,7 @@ def singular_integrals(x: FloatArray, rings: FloatArray) -> ArrayPair:
     share, weights = gauss_panels(1.0, 1.0, _ORDER)
     s = starts[:, None] + lengths[:, None] * share
     hats = np.stack([1 - share, share])[:, None] * (s * lengths[:, None] * weights)
-    kernels = _kernels(x[:, None, None], s[None], np.abs(x[:, None, None] - s))
+    kernels = _kernels(x[:, None, None], s[None], abs(x[:, None, None] - s))
     integrals = np.einsum("kmeo,heo->hkme", kernels, hats)
     near = np.maximum(starts - x[:, None], x[:, None] - ends) < lengths
     integrals[..., near] = _near_integrals(x, starts, ends, near)
@@ -157,9 +157,9 @@ def _near_integrals(
         outside = np.flatnonzero(side != cut)
         width = (side - cut)[outside, None]
         s = cut[outside, None] + width * v
-        distance = np.abs(at - cut)[outside, None] + np.abs(width) * v
+        distance = abs(at - cut)[outside, None] + abs(width) * v
         rising = (s - start[outside, None]) / (end - start)[outside, None]
-        hats = np.stack([1 - rising, rising]) * (np.abs(width) * weights * s)
+        hats = np.stack([1 - rising, rising]) * (abs(width) * weights * s)
         kernels = _kernels(at[outside, None], s, distance)
         totals[..., outside] += np.einsum("kmo,hmo->hkm", kernels, hats)
     return totals

@@ -66,11 +66,11 @@ def tabulated_rod(film: ElasticFilm, rod: Rod, load: float, *, sticking: bool) -
     from scipy.optimize import brentq
 
     column = _column(film.poisson_ratio, rod.radius / film.thickness, sticking=sticking)
-    if column is None or load > largest_tabulated_load(film, rod, sticking=sticking):
+    if not column or load > largest_tabulated_load(film, rod, sticking=sticking):
         return None
     rows, deepest = column
     scale = film.shear_modulus * film.thickness**2
-    depth = float(brentq(lambda d: _load(rows, d) - load / scale, 0.0, deepest, xtol=1e-12))
+    depth = brentq(lambda d: _load(rows, d) - load / scale, 0.0, deepest, xtol=1e-12)
     normal, shear = rows(np.cbrt(depth))[1:].reshape(2, -1) * load
     inside: Any = TabulatedField(base_wavenumbers(film), (normal, shear), rod.radius)
     loads = _load(rows, _STEPS * depth) * scale
@@ -106,7 +106,7 @@ def largest_tabulated_load(film: ElasticFilm, rod: Rod, *, sticking: bool) -> fl
     """Return the load (N) at which the table ends for a rod; 0 outside the table."""
     column = _column(film.poisson_ratio, rod.radius / film.thickness, sticking=sticking)
     scale = film.shear_modulus * film.thickness**2
-    return 0.0 if column is None else float(_load(*column)) * scale
+    return float(_load(*column)) * scale if column else 0.0
 
 
 _Rows = Callable[[Any], Any]

@@ -157,7 +157,7 @@ INVALID = {
     "apply sensor.apparatus.h5 sensor.apparatus.h5": "memscal-scan",
     "batch left.csv -o new": "left.csv, line 2: could not convert string to float: 'left'",
     "batch no_path.csv -o new": "line 2 has no path",
-    "batch none.csv -o new": "neither a folder nor",
+    "batch none.csv -o new": "none.csv cannot be read",
     "batch semicolons.csv -o new": "None of the 2 scans",
     "batch um.csv -o new": "'wafer_x (um)'",
     "calibrate '\x1b[2Jscan.h5'": "[2Jscan.h5 cannot be read: No such file",

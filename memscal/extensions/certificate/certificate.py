@@ -41,11 +41,12 @@ _SENSOR_PARAMETERS = (
     "conversion_constant",
     "gaussian_sigma",
     "gaussian_sigma_deconvolved",
-    "fwhm",
-    "noise_equivalent_area",
     "ellipticity",
     "ellipticity_diagonal",
+    "fwhm",
+    "noise_equivalent_area",
 )
+_OF_GAUSSIAN = _SENSOR_PARAMETERS[1:5]
 #: Bounds of the budget, anywhere within which the truth may lie: rectangles.
 _BOUNDS = ("model_form", "rod_friction")
 #: Places spread evenly over a rectangle of half a width of one.
@@ -71,6 +72,7 @@ class CertifiedValue:
     factor: float = COVERAGE_FACTOR  # k: larger where an estimated noise has few degrees of freedom
     degrees: float = math.inf  # effective ones of the uncertainty
     bounds: tuple[float, ...] = ()  # standard uncertainties of the rectangles in it
+    rejected: bool = False  # it is of a Gaussian, from which the scan shows a departure
 
     @property
     def expanded(self) -> float:
@@ -81,7 +83,7 @@ class CertifiedValue:
     def determined(self) -> bool:
         """Whether the scan tells the value: of a number without a unit zero is a value, too."""
         largest = _DETERMINED * abs(self.value) if self.quantity.unit else math.inf
-        return self.expanded <= largest
+        return not self.rejected and self.expanded <= largest
 
     def probability(self, lower: float, upper: float) -> float:
         r"""Probability that the true value lies between limits, in SI units.
@@ -112,10 +114,14 @@ class Conformity:
     guard_band: float
 
     @property
+    def acceptance(self) -> tuple[float, float]:
+        """The acceptance interval (JCGM 106:2012, 8.3.2)."""
+        return self.lower + self.guard_band, self.upper - self.guard_band
+
+    @property
     def accepted(self) -> bool:
-        """Whether the value lies within the acceptance interval (JCGM 106:2012, 8.3.2)."""
-        lowest = self.lower + self.guard_band
-        highest = self.upper - self.guard_band
+        """Whether the value lies within the acceptance interval."""
+        lowest, highest = self.acceptance
         return lowest <= self.certified.value <= highest
 
     @property
@@ -193,7 +199,8 @@ def certify(
     """Return the contents of a certificate; all that it lacks is named, and refused or said."""
     apparatus.require_pascals()
     sections, equipment = _completed(apparatus, laboratory)
-    texts = _texts(sections["certificate"].get("language", "en"))
+    language = sections["certificate"].get("language", "en")
+    texts = tomllib.loads((TEXTS / f"{language}.toml").read_text(encoding="utf-8"))
     values = {}
     parameters = apparatus.parameters
     for name in (*_SENSOR_PARAMETERS, _OTHER):
@@ -237,13 +244,10 @@ def certify(
     )
 
 
-def _texts(language: str) -> Values:
-    return tomllib.loads((TEXTS / f"{language}.toml").read_text(encoding="utf-8"))
-
-
 def _certified(apparatus: ApparatusFunction, name: str) -> CertifiedValue:
     parameters = apparatus.parameters
     budget = apparatus.budget.get(name, {})
+    gaussian = all(check.passed for check in apparatus.checks if "gaussian" in check.name)
     return CertifiedValue(
         parameter_quantity(parameters, name),
         parameters[name],
@@ -251,6 +255,7 @@ def _certified(apparatus: ApparatusFunction, name: str) -> CertifiedValue:
         apparatus.coverage_factor(name),
         apparatus.effective_degrees.get(name, math.inf),
         tuple(budget[source] for source in _BOUNDS if budget.get(source)),
+        rejected=name in _OF_GAUSSIAN and not gaussian,
     )
 
 
@@ -269,12 +274,12 @@ def _unstated(
         "thickness": film is not None and film.thickness_uncertainty is None,
         "radius": rod is not None and rod.radius_uncertainty is None,
     }
-    for name in [name for name, lacking in unstated.items() if lacking]:
-        yield Missing(words[name], f"memscal import --{name.replace('_', '-')}-uncertainty")
-    for check in apparatus.checks:
-        if not check.passed:
-            name = check.name.replace("_", " ")
-            yield Missing(f"{words['check']} {name}", f"memscal explain {check.name}")
+    for name, lacking in unstated.items():
+        if lacking:
+            yield Missing(words[name], f"memscal import --{name.replace('_', '-')}-uncertainty")
+    failed = ", ".join(check.name for check in apparatus.checks if not check.passed)
+    if failed:
+        yield Missing(f"{words['checks']} ({failed.replace('_', ' ')})", "memscal explain CHECK")
     if not values["conversion_constant"].determined:
         yield Missing(words["conversion_constant"], "measure with less noise")
 

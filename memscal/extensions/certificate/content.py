@@ -23,8 +23,6 @@ from memscal.model.quantities import MM, PER_MM, PER_MM2
 from memscal.summaries.declared import total_of
 from memscal.summaries.table import Table
 
-#: Percent that are shown whole.
-_WHOLE = 100
 #: Sources of the budget that count what is taken for granted, where they have other names.
 _COUNTED_AS = {"stage_scale": "position_scale", "film_law": "model_form", "load_scale": "load"}
 
@@ -160,8 +158,10 @@ def _of_calibration(certificate: Certificate) -> dict[str, str]:
     if loads is None:
         loads = apparatus.load
     if loads is not None:
-        ends = dict.fromkeys(f"{end:.4g} N" for end in (np.min(loads), np.max(loads)))
-        fields["load"] = " – ".join(ends)
+        share = process.configuration.get("relative_load_uncertainty")
+        ends = [np.min(loads), np.max(loads)]
+        texts = [_expanded(end, share * end, 1.0, "N") if share else f"{end:.4g} N" for end in ends]
+        fields["load"] = " – ".join(dict.fromkeys(texts))
     rod = apparatus.indenter
     if rod is not None:
         fields["shape"] = certificate.words("shapes", rod.shape)
@@ -193,14 +193,16 @@ def _measured(value: CertifiedValue) -> str:
 
 
 def _stated(certificate: Certificate, value: CertifiedValue) -> str:
-    return f"{_name(certificate, value)} (U/y = {_share(value)})"
+    of_gaussian = certificate.words("states", "rejected")
+    reason = of_gaussian if value.rejected else f"U/y = {_share(value)}"
+    return f"{_name(certificate, value)} ({reason})"
 
 
 def _share(value: CertifiedValue) -> str:
     if not value.quantity.unit:
         return "–"
-    share = 100 * value.expanded / abs(value.value)
-    return f"{share:.2g} %" if share < _WHOLE else f"{share:.0f} %"
+    share = float(f"{100 * value.expanded / abs(value.value):.2g}")
+    return f"{share:g} %"
 
 
 def _values(certificate: Certificate) -> Made:
@@ -215,8 +217,10 @@ def _values(certificate: Certificate) -> Made:
 
 
 def _others(certificate: Certificate) -> Made:
-    rows = [(_name(certificate, v), _measured(v), f"{v.factor:.3g}") for v in certificate.others]
-    return (), [*rows]
+    rows: Rows = [
+        (_name(certificate, v), _measured(v), f"{v.factor:.3g}") for v in certificate.others
+    ]
+    return (), rows
 
 
 def _profile(certificate: Certificate) -> Made:
@@ -247,21 +251,24 @@ def assumption_rows(certificate: Certificate) -> Rows:
         if each.name == "noise_correlation":
             counted = each.state != ASSUMED
         measure = certificate.words("measures", each.name)
-        size = f"{measure}: {each.size_text('conversion_constant')}"
-        state = certificate.words("states", each.state)
-        sentence = certificate.words("assumptions", each.name)
-        rows.append([sentence, size, state, certificate.words("states", f"counted_{counted}")])
+        size = certificate.words("states", each.size_text("conversion_constant"))
+        row = [certificate.words("assumptions", each.name), f"{measure}: {size}"]
+        row.append(certificate.words("states", each.state))
+        rows.append([*row, certificate.words("states", f"counted_{counted}")])
     return rows
 
 
 def _budget(certificate: Certificate) -> Made:
     """Return contributions to u of each value, in the unit of its last digits."""
-    heads = []
-    for i, value in enumerate(certificate.values, start=1):
-        _, power = _digits(value)
-        factor = f"10{str(power).translate(SUPERSCRIPTS)}" if power else ""
-        heads.append(" ".join(filter(None, (f"({i})", factor, value.quantity.unit))))
+    heads = [f"({i}) {_unit(value)}" for i, value in enumerate(certificate.values, start=1)]
     return heads, _contributions(certificate)[0]
+
+
+def _unit(value: CertifiedValue) -> str:
+    """Return the unit of a value's last digits, with the power of ten before it."""
+    _, power = _digits(value)
+    factor = f"10{str(power).translate(SUPERSCRIPTS)} " if power else ""
+    return f"{factor}{value.quantity.unit}".strip()
 
 
 def _contributions(certificate: Certificate) -> tuple[Rows, list[str]]:
@@ -299,12 +306,15 @@ def _digits(value: CertifiedValue) -> tuple[int, int]:
 def _conformity(certificate: Certificate) -> Made:
     rows: Rows = []
     for item in certificate.conformity:
-        quantity = item.certified.quantity
-        w = item.guard_band
-        limits = (item.lower, item.upper, item.lower + w, item.upper - w)
-        numbers = [number / quantity.scale for number in (item.certified.value, *limits)]
-        y, lower, upper, lowest, highest = _alike(numbers)
-        row = [f"{_name(certificate, item.certified)} ({quantity.unit or '1'})", y]
+        value = item.certified
+        places, power = _digits(value)
+        unit = 10.0**power * value.quantity.scale
+        # One digit more than the value has: limits are no values that are measured.
+        y, lower, upper, lowest, highest = (
+            f"{number / unit:.{places + 1}f}".replace("inf", "∞")
+            for number in (value.value, item.lower, item.upper, *item.acceptance)
+        )
+        row = [f"{_name(certificate, value)} ({_unit(value) or '1'})", y]
         row += [f"{lower} – {upper}", f"{lowest} – {highest}", _percent(item.probability)]
         rows.append([*row, certificate.words("statements", item.statement)])
     return (), rows
@@ -314,14 +324,6 @@ def _percent(probability: float) -> str:
     if probability > 0.9999:
         return "> 99.99 %"
     return f"{100 * probability:.2f} %" if probability >= 1e-4 else "< 0.01 %"
-
-
-def _alike(numbers: list[float]) -> list[str]:
-    """Write numbers with one power of ten, that of the first; no limit as an infinity."""
-    power = int(np.floor(np.log10(abs(numbers[0])))) if numbers[0] else 0
-    factor = f"×10{str(power).translate(SUPERSCRIPTS)}" if not -3 < power < 4 else ""
-    scale = 10.0**power if factor else 1.0
-    return [f"{n / scale:.5g}{factor}" if np.isfinite(n) else "∞" for n in numbers]
 
 
 def scan_figure(apparatus: ApparatusFunction) -> Figure:

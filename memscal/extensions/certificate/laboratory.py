@@ -5,7 +5,7 @@ import re
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from datetime import date, datetime
+from datetime import date
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -225,9 +225,11 @@ def _value(where: str, kind: str, value: Any) -> Any:
         pattern, form = _FORMS[kind]
         if isinstance(value, str) and value.isprintable() and re.fullmatch(pattern, value):
             return value.strip()
+        for near in get_close_matches(str(value), pattern.split("|"), 1):
+            form += f" (did you mean {near}?)"
     elif kind == "date":
         form = "a date, 2026-11-20"
-        if isinstance(value, date) and not isinstance(value, datetime):
+        if type(value) is date:
             return value.isoformat()
     elif kind == "time":
         form = "a date, 2026-11-20, or a time, 2026-11-20T09:30:00+01:00"
@@ -260,6 +262,4 @@ def _measured(
         unit = "K"
         zero = ZERO_CELSIUS
     number = float(to_si(value, unit, dimension, where)) + zero
-    if uncertainty is None:
-        return Measured(number, None)
-    return Measured(number, float(to_si(uncertainty, unit, dimension, where)))
+    return Measured(number, uncertainty and float(to_si(uncertainty, unit, dimension, where)))

@@ -1,9 +1,9 @@
 """Batch of calibrations: shards of scans, each a task and a Parquet file that proves its work."""
 
 import hashlib
-import os
 import shutil
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
 from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
@@ -19,6 +19,7 @@ from memscal.errors import InputError, MemscalError, OutputError
 from memscal.extensions.fleet.many import attempted
 from memscal.extensions.fleet.recipe import place_in_name
 from memscal.extensions.fleet.shards import (
+    BATCH,
     DIGEST,
     FLEET_SCHEMA_VERSION,
     TABLE_SUFFIXES,
@@ -29,6 +30,7 @@ from memscal.extensions.fleet.shards import (
     read_batch,
     read_shard,
     relative,
+    require_same,
     shard_paths,
     write_batch,
     write_shard,
@@ -39,6 +41,9 @@ from memscal.model.arrays import Values
 from memscal.model.provenance import timestamp
 from memscal.model.scan import Scan
 from memscal.version import __version__
+
+Counts = Counter[str]
+"""Numbers of scans, of errors, of failed checks, and of shards that were kept."""
 
 _LONGEST_STEM = 80
 #: Shards, as many as balance the workers, and the scans of one.
@@ -61,16 +66,6 @@ class Shard:
     def name(self) -> str:
         """Name of its table, and of its folder of artifacts."""
         return f"shard-{self.number:06d}"
-
-
-@dataclass(frozen=True)
-class ShardOutcome:
-    """How many scans a shard has, how many of them have an error, and how many a failed check."""
-
-    scans: int
-    errors: int
-    failed: int
-    kept: bool  # its file was there already
 
 
 @dataclass(frozen=True)
@@ -141,52 +136,35 @@ class Batch:
         arrow()
         results = self.results
         count = self._counted()
-        stays = "It may hold results, which are not replaced."
-        with suppress(FileNotFoundError, NotADirectoryError):
-            free = resume or self.anew
-            if not free and any(path.is_file() for path in results.rglob("*")):
-                raise OutputError(
-                    f"The folder {results} exists.",
-                    why=stays,
-                    cure="Continue them with --resume, do them anew with --force, or give another "
-                    "folder.",
-                )
-        begun = read_batch(results)
+        free = resume or self.anew
+        if not free and any(path.is_file() for path in results.rglob("*")):
+            raise OutputError(
+                f"The folder {results} exists.",
+                why="It may hold results, which are not replaced.",
+                cure="Continue them with --resume, do them anew with --force, or give another "
+                "folder.",
+            )
+        begun = read_batch(results / BATCH)
         done = shard_paths(results)
         if done and not self.anew:
-            self._require_same(begun.get("options", {}))
-        balanced = min(max(_SMALLEST, -(-count // _SHARDS)), _LARGEST)
-        size = self.shard_size or begun.get("shard_size") or balanced
+            require_same(results / BATCH, self.stated)
+        size = self.shard_size or begun.get("shard_size")
+        size = size or min(max(_SMALLEST, -(-count // _SHARDS)), _LARGEST)
         sized = replace(self, shard_size=size, count=count)
         if not self.anew:
             sized._require_same_scans(done)
         # Workers see the same files from folders of their own.
-        sources = [Path(os.path.realpath(path)) for path in self.sources]
-        return replace(sized, sources=sources, results=Path(os.path.realpath(results)))
-
-    def _require_same(self, before: Mapping[str, str]) -> None:
-        """Refuse to go on with other options than before, and name each."""
-        absent = "not stated"
-        changed = [
-            f"{name}: {before.get(name, absent)}, now {self.stated.get(name, absent)}"
-            for name in {**before, **self.stated}
-            if before.get(name) != self.stated.get(name)
-        ]
-        if changed:
-            raise InputError(
-                f"{self.results} was begun with other options: {'; '.join(changed)}.",
-                why="Nothing was touched.",
-                cure="Give the options as they were, or another folder; --force does all anew.",
-            )
+        sources = [path.resolve() for path in self.sources]
+        return replace(sized, sources=sources, results=results.resolve())
 
     def _require_same_scans(self, done: Iterable[Path]) -> None:
         """Refuse to go on with other scans than before; more of them may follow."""
         tables = {path: _paths_in(path) for path in done}
         for shard in self.shards():
             stored = tables.pop(self.table(shard), [])
-            before = [os.path.realpath(self.results / name) for name in stored]
+            before = [(self.results / name).resolve() for name in stored]
             scans = shard.scans[: len(stored)]
-            if before != [os.path.realpath(self.folder / scan.path) for scan in scans]:
+            if before != [(self.folder / scan.path).resolve() for scan in scans]:
                 tables = {self.table(shard): stored}
                 break
         if tables:  # one that differs, or those beyond the last scan
@@ -226,12 +204,12 @@ class Batch:
             )
         return count
 
-    def run(self, executor: Executor, most: Callable[[], int]) -> Iterator[ShardOutcome]:
-        """Yield the outcomes of the shards as they are done, of which ``most()`` are in flight."""
+    def run(self, executor: Executor, most: Callable[[], int]) -> Iterator[Counts]:
+        """Yield the counts of the shards as they are done, of which ``most()`` are in flight."""
         stated = {"scans": self.count, "shard_size": self.shard_size, "options": self.stated}
-        write_batch(self.results, stated)
+        write_batch(self.results / BATCH, stated)
         shards = self.shards()
-        tasks = set[Future[ShardOutcome]]()
+        tasks = set[Future[Counts]]()
         lost = []
         try:
             while True:
@@ -270,8 +248,8 @@ def _sha256_of(value: object) -> str:
     return hashlib.sha256(repr(value).encode()).hexdigest()
 
 
-def run_shard(batch: Batch, shard: Shard) -> ShardOutcome:
-    """Calibrate the scans of a shard, unless its file is there and is of the same work."""
+def run_shard(batch: Batch, shard: Shard) -> Counts:
+    """Calibrate the scans of a shard, unless its file is there and is of the same work; count."""
     if batch.version != __version__:
         raise MemscalError(
             f"A worker has memscal {__version__}, the batch {batch.version}.",
@@ -287,7 +265,7 @@ def run_shard(batch: Batch, shard: Shard) -> ShardOutcome:
         write_shard(batch.table(shard), rows, digest)
     errors = sum(row["error"] is not None for row in rows)
     failed = sum(not row["passed"] for row in rows) - errors
-    return ShardOutcome(len(rows), errors, failed, kept)
+    return Counter(scans=len(rows), errors=errors, failed=failed, kept=kept)
 
 
 def _kept_rows(batch: Batch, shard: Shard) -> list[Values]:
@@ -297,18 +275,17 @@ def _kept_rows(batch: Batch, shard: Shard) -> list[Values]:
             table = read_shard(batch.table(shard))
             inputs = [_sha256_of_file(batch.folder / scan.path) for scan in shard.scans]
             if table.schema.metadata.get(DIGEST.encode()) == _digest(batch, shard, inputs).encode():
-                names = ["passed", "error", "artifact"]
-                rows: list[Values] = table.select(names).to_pylist()
-                written = (batch.results / row["artifact"] for row in rows if row["artifact"])
-                if all(path.exists() for path in written):
+                rows: list[Values] = table.select(["passed", "error", "artifact"]).to_pylist()
+                names = [row["artifact"] for row in rows if row["artifact"]]
+                if all((batch.results / name).exists() for name in names):
                     return rows
     return []
 
 
 def _digest(batch: Batch, shard: Shard, inputs: list[str | None]) -> str:
     """Return the digest of version, options, and of the contents and places of the scans."""
-    made = batch.version, FLEET_SCHEMA_VERSION, batch.options_sha256
-    return _sha256_of((*made, shard, inputs))
+    made = batch.version, FLEET_SCHEMA_VERSION, batch.options_sha256, shard, inputs
+    return _sha256_of(made)
 
 
 def _sha256_of_file(path: Path) -> str | None:
@@ -335,8 +312,8 @@ def _row(batch: Batch, shard: Shard, i: int) -> Values:
     }
     apparatus = attempted(item.path, lambda: _calibrated(batch, path, row))
     if isinstance(apparatus, MemscalError):
-        parts = vars(apparatus)  # problem and cure among them
-        return row | {"error_class": type(apparatus).__name__, "error": str(apparatus), **parts}
+        row |= {"error_class": type(apparatus).__name__, "error": str(apparatus)}
+        return row | vars(apparatus)  # problem and cure among them
     if batch.artifacts == "all" or (batch.artifacts == "failed" and not apparatus.passed):
         name = f"{shard.first + i:07d}-{path.stem[:_LONGEST_STEM]}.apparatus.h5"
         artifact = Path("artifacts", shard.name, name)
@@ -348,9 +325,9 @@ def _row(batch: Batch, shard: Shard, i: int) -> Values:
 
 def _calibrated(batch: Batch, path: Path, row: Values) -> ApparatusFunction:
     """Calibrate with a scan; add what it states to its row."""
+    if batch.recipe and batch.recipe["name_pattern"] and row["wafer_x"] is None:
+        row |= place_in_name(path, batch.recipe)
     scan = batch.read(path)
     row |= asdict(scan.sensor) | {"start_time": scan.start_time}
     row["sensor"] = row["sensor"] or scan.sensor.name
-    if batch.recipe and batch.recipe["name_pattern"] and row["wafer_x"] is None:
-        row |= place_in_name(path, batch.recipe)
     return calibrate(scan, other=False, **batch.options).apparatus

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import os
+from collections import Counter
 from collections.abc import Iterator
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from functools import partial
-from operator import attrgetter
+from operator import itemgetter
 from pathlib import Path
 from time import monotonic
 from typing import TYPE_CHECKING, Any
@@ -20,7 +20,7 @@ from memscal.cli.options import FILE, json_option, option, report_option
 from memscal.errors import MemscalError
 
 if TYPE_CHECKING:
-    from memscal.extensions.fleet.batch import Batch, ShardOutcome
+    from memscal.extensions.fleet.batch import Batch, Counts
 
 EXAMPLES = """\b
 Examples:
@@ -97,6 +97,7 @@ def command(
     from memscal.extensions.fleet.batch import Batch
     from memscal.extensions.fleet.import_tables import attempt_all, emit_counts
     from memscal.extensions.fleet.recipe import recipe_of
+    from memscal.extensions.fleet.results_summary import error_groups
     from memscal.extensions.fleet.shards import expanded, make_folder, read_fleet, shard_paths
     from memscal.progress import span
 
@@ -105,14 +106,12 @@ def command(
     words, reading = recipe_of(recipe) if recipe else ({}, None)
     words |= settings | {"artifacts": artifacts}
     batch = Batch(paths, results, chosen, artifacts, words, reading, force, shard_size)
-    within = Path(os.path.realpath(results))
-    if report is not None and within not in Path(os.path.realpath(report)).parents:
-        scans = batch.scans() if report.exists() else ()
-        inputs = [*paths, *(batch.folder / scan.path for scan in scans)]
-        out.prove_writable([report], force=force, inputs=inputs)
+    if report is not None and results not in report.parents:
+        scans = (batch.folder / scan.path for scan in batch.scans())
+        out.prove_writable([report], force=force, inputs=[*paths, *scans])
     batch = batch.prepare(resume=resume)
     if dry_run:
-        numbers = {"scans": batch.count, "shards": len(list(batch.shards()))}
+        numbers = {"scans": batch.count, "shards": len([*batch.shards()])}
         jobs = {scan.path: partial(batch.read, batch.folder / scan.path) for scan in batch.scans()}
         return CHECK_FAILED if attempt_all(jobs, numbers, as_json=as_json) else DONE
     make_folder(results / "shards")
@@ -125,21 +124,25 @@ def command(
         if shard_paths(results):
             out.note("The shards that are done stay: --resume does the rest.")
         raise
-    errors = sum(outcome.errors for outcome in outcomes)
-    failed = sum(outcome.failed for outcome in outcomes)
-    kept = sum(outcome.kept for outcome in outcomes)
     seconds = monotonic() - start
+    done = sum(outcomes, Counter())
+    errors = done["errors"]
+    failed = done["failed"]
     counts = {
         "scans": total,
         "passed": total - errors - failed,
         "failed_checks": failed,
         "errors": errors,
-        "shards_written": len(outcomes) - kept,
-        "shards_kept": kept,
+        "shards_written": len(outcomes) - done["kept"],
+        "shards_kept": done["kept"],
         "time": span(seconds),
     }
     told = {"results": str(results), "time": {"value": round(seconds, 1), "unit": "s"}}
-    emit_counts(f"Batch of {paths[0].name}", counts, told, as_json=as_json)
+    emit_counts("Batch", counts, told, as_json=as_json)
+    if errors:
+        with suppress(MemscalError):  # sensors of several kinds, which a summary refuses
+            for group in error_groups(read_fleet(results))[:4]:
+                out.message("{scans} of {error_class}, as {first}: {problem}".format(**group))
     out.say_written([results])
     if report is not None:  # whose errors are told after what the batch has done
         out.write_files(out.reported(read_fleet(results), report), force=force)
@@ -151,8 +154,8 @@ def command(
     return CHECK_FAILED
 
 
-def _outcomes(batch: Batch, workers: int | None, scheduler: str | None) -> Iterator[ShardOutcome]:
-    """Yield the outcomes of a batch, and show how far it is."""
+def _outcomes(batch: Batch, workers: int | None, scheduler: str | None) -> Iterator[Counts]:
+    """Yield the counts of a batch, and show how far it is."""
     from memscal.parallel import cluster, cores, worker_pool
     from memscal.progress import Task
 
@@ -167,6 +170,6 @@ def _outcomes(batch: Batch, workers: int | None, scheduler: str | None) -> Itera
                 return 2 * count
 
         stack.enter_context(out.working("Calibrating", rate=True))
-        size = attrgetter("scans")
-        kept = attrgetter("kept")
+        size = itemgetter("scans")
+        kept = itemgetter("kept")
         yield from Task("scans", batch.count).counted(batch.run(executor, most), size, kept)

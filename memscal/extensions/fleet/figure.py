@@ -37,14 +37,15 @@ def fleet_figure(fleet: FleetResults) -> Figure:
             values = getattr(fleet, name)
             middle = median(values)
             label = f"{symbol} over {middle:.4g} {fleet.unit_of(symbol)}, less 1 (%)"
+            label = label.replace("sigma", "σ")
             change = 100 * (values / middle - 1)
-            _distribution(upper, change, label.replace("sigma", "σ"))
+            _distribution(upper, change, label)
             if symbol in fleet.tolerances:
                 centre, allowed = fleet.allowed(symbol)
                 ends = 100 * (np.array([centre - allowed, centre + allowed]) / middle - 1)
                 upper.axvspan(*ends, color=GAUSSIAN, alpha=0.2, zorder=0, label="tolerance")
                 legend_above(upper)
-            _places(lower, fleet, change, label.replace("sigma", "σ"))
+            _places(lower, fleet, change, label)
     return figure
 
 
@@ -70,8 +71,9 @@ def _places(axes: Axes, fleet: FleetResults, change: FloatArray, label: str) -> 
     if np.isfinite(x + y).any():
         # The panel stays as it is: of a single row the axes show more.
         axes.set_aspect("equal", adjustable="datalim")
-        axes.set_xlabel("$x$ on the wafer (mm)")
-        axes.set_ylabel("$y$ on the wafer (mm)")
+        counted = fleet.place_unit == "die"
+        axes.set_xlabel("column of dies" if counted else "$x$ on the wafer (mm)")
+        axes.set_ylabel("row of dies" if counted else "$y$ on the wafer (mm)")
         centre = (np.nanmin(x) + np.nanmax(x)) / 2, (np.nanmin(y) + np.nanmax(y)) / 2
         radius = np.nanmax(np.hypot(x - centre[0], y - centre[1]))
         axes.add_patch(Circle(centre, radius, fill=False, color=MUTED, lw=0.8))
@@ -108,11 +110,10 @@ def report(fleet: FleetResults) -> Report:
         "what is beyond them. c, d: both over the wafer, or along the batch, with the names of "
         "outliers."
     )
-    picture = Picture(fleet.plot, f"Panels: {caption} {counts}", caption)
     return Report(
         title=f"Calibrations of {fleet.name}",
         verdict=counts,
         failed=bool(fleet.failed),
-        pictures=[picture],
+        pictures=[Picture(fleet.plot, f"Panels: {caption} {counts}", caption)],
         messages=fleet.messages,
     )

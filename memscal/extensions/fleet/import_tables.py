@@ -1,5 +1,6 @@
 """Import of several tables, each by itself, to a folder of scans."""
 
+import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
@@ -13,8 +14,15 @@ from memscal.cli.import_ import convert, prepared
 from memscal.cli.options import Options
 from memscal.errors import InputError, MemscalError
 from memscal.extensions.fleet.many import attempted
-from memscal.extensions.fleet.recipe import place_in_name, recipe_text
-from memscal.extensions.fleet.shards import TABLE_SUFFIXES, expanded, make_folder, manifest_scans
+from memscal.extensions.fleet.recipe import expression_of, place_in_name, recipe_text
+from memscal.extensions.fleet.shards import (
+    TABLE_SUFFIXES,
+    expanded,
+    make_folder,
+    manifest_scans,
+    require_same,
+    write_batch,
+)
 from memscal.model.checks import Message, marked_texts
 from memscal.progress import Task
 from memscal.summaries.table import Table
@@ -30,28 +38,35 @@ def import_tables(context: click.Context, options: Options) -> int:
     if asked["figure"]:
         raise click.UsageError("--figure belongs to one table.")
     targets = _targets(expanded(asked["tables"]), folder)
+    text = recipe_text(context)
+    stated = dict(re.findall("(.+) = (.+)", text))
     options = prepared(targets.values(), asked["kind"], options)
-    wanted = [path for path in targets if not (asked["resume"] and path.exists())]
+    expression_of(options)
+    wanted = [path for path in targets if force or not (asked["resume"] and path.exists())]
+    counts = {"tables": len(targets), "kept": len(targets) - len(wanted)}
+    record = folder / "import.json"
+    if counts["kept"]:
+        require_same(record, stated)
     if writing:
         there = [path for path in wanted if path.exists()]
         out.prove_writable([*there, recipe], force=force, inputs=targets.values())
         make_folder(folder)
+        write_batch(record, {"options": stated})
     jobs = {}
     for path in wanted:
         output = path if writing else None
-        job = partial(convert, targets[path], output, asked["kind"], options, force=force)
-        jobs[str(targets[path])] = job
-    counts = {"tables": len(targets), "kept": len(targets) - len(wanted)}
+        table = targets[path]
+        jobs[str(table)] = partial(convert, table, output, asked["kind"], options, force=force)
     refused = attempt_all(jobs, counts, as_json=asked["as_json"])
     files = {}
     if recipe and len(refused) < len(jobs):
-        files[recipe] = recipe_text(context)
+        files[recipe] = text
     if options["name_pattern"]:
-        lines = ["path,sensor,wafer_x,wafer_y"]
+        lines = ["path,sensor,wafer_x,wafer_y,place_unit"]
         for path, table in targets.items():
             if str(table) not in refused:
                 place = place_in_name(table, options).values()
-                lines.append('"{}","{}",{},{}'.format(path.name, *place))
+                lines.append('"{}","{}",{},{},{}'.format(path.name, *place))
         files[folder / "manifest.csv"] = "\n".join([*lines, ""])
     if writing:
         out.write_files({path: text.encode() for path, text in files.items()}, force=True)
@@ -75,8 +90,8 @@ def _targets(sources: Iterable[Path], folder: Path) -> dict[Path, Path]:
                 )
             targets[target] = table
     if not targets:
-        cure = f"Their names end in {', '.join(TABLE_SUFFIXES)}."
-        raise InputError("The folder holds no tables.", cure=cure)
+        endings = ", ".join(TABLE_SUFFIXES)
+        raise InputError(f"The folder holds no tables, whose names end in {endings}.")
     return targets
 
 
@@ -92,18 +107,15 @@ def attempt_all(
             if isinstance(done, MemscalError):
                 refused[name] = done
             else:
-                notes += done if isinstance(done, Sequence) else getattr(done, "messages", ())
+                notes += done if isinstance(done, Sequence) else done.messages
     numbers = {**counts, "read": len(jobs) - len(refused), "refused": len(refused)}
-    problems = [
-        {"path": name, "problem": error.problem, "why": error.why, "cure": error.cure}
-        for name, error in refused.items()
-    ]
-    further = {"problems": problems, "notes": marked_texts(notes)}
-    causes = [(name, f"{e.problem} {e.why}".strip(), e.cure) for name, e in refused.items()]
-    table = Table("Refused", ("input", "problem", "cure"), causes)
-    emit_counts("Tables", numbers, further, table, as_json=as_json)
+    problems = [{"path": name, **vars(error)} for name, error in refused.items()]
+    causes = [tuple(problem.values()) for problem in problems]
+    table = Table("Refused", ("input", "problem", "why", "cure"), causes)
+    told = {"problems": problems, "notes": marked_texts(notes)}
+    emit_counts("Tables", numbers, told, table, as_json=as_json)
     if not as_json:
-        out.show_messages(notes)
+        out.show_messages(notes, "tables")
     return refused
 
 

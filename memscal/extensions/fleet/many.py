@@ -71,8 +71,7 @@ class FleetCalibration:
     def __repr__(self) -> str:
         """Return A, or the error."""
         if self.apparatus is None:
-            problem = self.error.problem if self.error is not None else "no result"
-            return f"<FleetCalibration {self.index}: {problem}>"
+            return f"<FleetCalibration {self.index}: {self.error and self.error.problem}>"
         return f"<FleetCalibration {self.index}: {self.apparatus!r}>"
 
     @property

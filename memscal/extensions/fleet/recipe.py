@@ -3,6 +3,7 @@
 import json
 import re
 import tomllib
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +31,8 @@ SECTIONS = {
 }
 """Keys of each section: options of ``memscal import``, with underscores."""
 
+#: Where each key stands.
+_SECTION_OF = {key: section for section, keys in SECTIONS.items() for key in keys.split()}
 _LONGEST = 1 << 20
 #: Fields of a pattern of names.
 _FIELDS = {
@@ -50,11 +53,11 @@ def read_recipe(context: click.Context, path: Path) -> None:
     options = {option.name: option for option in context.command.params}
     stated: Options = {}
     for section, entries in content.items():
-        known = SECTIONS.get(section, "").split()
-        for key, value in entries.items() if isinstance(entries, dict) else [("", entries)]:
+        for key, value in entries.items() if isinstance(entries, dict) else [(section, entries)]:
             try:
-                if key not in known:
-                    raise click.BadParameter(f"Known are {', '.join(known or SECTIONS)}.")
+                if _SECTION_OF.get(key) != section:
+                    (near,) = get_close_matches(key, _SECTION_OF, 1, 0)
+                    raise click.BadParameter(f"Did you mean {near} in [{_SECTION_OF[near]}]?")
                 stated[key] = _as_typed(options[key], value)
                 options[key].type_cast_value(context, stated[key])
             except click.BadParameter as error:
@@ -94,15 +97,27 @@ def recipe_of(path: Path) -> tuple[Options, Options]:
     """Return what a recipe states, and the options with which it has tables read."""
     context = command.make_context("import", ["table", "-o", "scan", "--recipe", str(path)])
     words = {f"recipe {key}": value for key, value in (context.default_map or {}).items()}
-    return words, prepared((), "scan", context.params)
+    options = prepared((), "scan", context.params)
+    expression_of(options)
+    return words, options
+
+
+def expression_of(options: Options) -> str:
+    """Return the pattern of names as a regular expression; refuse a field that is not known."""
+    expression = re.escape(options["name_pattern"] or "")
+    for field in re.findall(r"\\{(.*?)\\}", expression):
+        if field not in _FIELDS:
+            (near,) = get_close_matches(field, _FIELDS, 1, 0)
+            raise click.UsageError(
+                f"--name-pattern has no field {{{field}}}. Did you mean {{{near}}}?"
+            )
+        expression = expression.replace(rf"\{{{field}\}}", _FIELDS[field])
+    return expression
 
 
 def place_in_name(path: Path, options: Options) -> Options:
-    """Return sensor, wafer_x and wafer_y (mm) that the name of a file states; refuse another."""
-    expression = re.escape(options["name_pattern"])
-    for field, words in _FIELDS.items():
-        expression = expression.replace(rf"\{{{field}\}}", words)
-    found = re.fullmatch(expression, path.stem)
+    """Return sensor, place and its unit that the name of a file states; refuse another name."""
+    found = re.fullmatch(expression_of(options), path.stem)
     if found is None:
         raise InputError(
             f"{path.name} is not named as {options['name_pattern']}.",
@@ -115,4 +130,5 @@ def place_in_name(path: Path, options: Options) -> Options:
         "sensor": stated.get("sensor", path.stem),
         "wafer_x": float(stated.get("col", "nan")) * columns,
         "wafer_y": float(stated.get("row", "nan")) * rows,
+        "place_unit": "mm" if options["die_pitch"] else "die",
     }

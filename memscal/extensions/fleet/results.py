@@ -39,10 +39,11 @@ class FleetResults(Shown):
     """Sensors in the order of their batch; arrays have NaN where a scan has an error.
 
     ``conversion_constant`` is in ``unit``, ``gaussian_sigma`` and the places on a wafer are in mm,
-    as in the files; ``failed`` has the names of the checks that failed, ``errors`` the errors, both
-    by the number of the sensor; ``name`` is that of the folder of results.  ``messages`` say what
-    is missing, mixed, repeated or overridden, ``provenance`` how the batch was calibrated,
-    ``tolerances`` by symbol how far sensors that pass may be off.
+    as in the files, or places are columns and rows, counted, where ``place_unit`` is "die";
+    ``failed`` has the names of the checks that failed, ``errors`` the errors, both by the number of
+    the sensor; ``name`` is that of the folder of results.  ``messages`` say what is missing, mixed,
+    repeated or overridden, ``provenance`` how the batch was calibrated, ``tolerances`` by symbol
+    how far sensors that pass may be off.
     """
 
     paths: Sequence[str]
@@ -56,6 +57,7 @@ class FleetResults(Shown):
     failed: Mapping[int, tuple[str, ...]]
     errors: Mapping[int, Failure]
     unit: str
+    place_unit: str = "mm"
     name: str = "sensors"
     messages: tuple[Message, ...] = ()
     provenance: Values = field(default_factory=dict)

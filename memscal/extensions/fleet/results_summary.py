@@ -24,8 +24,8 @@ _CENTRES = {
     "trend": "the wafer's smooth trend (quadratic in x and y)",
     "median": f"the median (a trend takes {FEWEST} calibrated sensors with their places)",
 }
-#: What errors of one kind differ in: words with digits, which are numbers and most names.
-_PARTICULARS = re.compile(r"\S*\d\S*")
+#: What errors of one kind differ in: what is quoted, and words with digits, as most names.
+_PARTICULARS = re.compile(r"'[^']*'|\S*\d\S*")
 
 
 def counts(fleet: FleetResults) -> Counts:
@@ -57,7 +57,7 @@ def failures(fleet: FleetResults) -> Counts:
     return dict(Counter(c for checks in fleet.failed.values() for c in checks).most_common())
 
 
-def _error_groups(fleet: FleetResults) -> list[Values]:
+def error_groups(fleet: FleetResults) -> list[Values]:
     """Return the errors that agree in class and first sentence, the most frequent first."""
     groups: dict[tuple[str, str], list[int]] = {}
     for i, error in fleet.errors.items():
@@ -110,7 +110,7 @@ def tables(fleet: FleetResults) -> list[Table]:
             for name in SUMMARISED.values()
         ]
         outlying.append((fleet.sensors[i], fleet.paths[i], *values, reason))
-    errors = [tuple(map(str, group.values())) for group in _error_groups(fleet)]
+    errors = [tuple(map(str, group.values())) for group in error_groups(fleet)]
     made = [(key.replace("_", " "), stated_text(text)) for key, text in fleet.provenance.items()]
     return [
         Table("Sensors", ("", "number", "share"), _shares(fleet, counts(fleet))),
@@ -145,8 +145,9 @@ def _by_symbol(title: str, found: Mapping[str, Values]) -> Table:
     """Return a row of numbers for each of A and sigma that has them."""
     rows = []
     heads: list[str] = []
-    for symbol, (unit, *numbers) in zip(found, map(dict.values, found.values()), strict=True):
-        heads = [key.replace("_", " ") for key in found[symbol] if key != "unit"]
+    for symbol, entry in found.items():
+        unit, *numbers = entry.values()
+        heads = [key.replace("_", " ") for key in entry if key != "unit"]
         if numbers[0] is not None:
             rows.append((f"{symbol} ({unit})", *(f"{number:.4g}" for number in numbers)))
     return Table(title, ("", *heads), rows)
@@ -166,7 +167,7 @@ def mapping(fleet: FleetResults) -> Values:
         "tolerances": tolerance_mapping(fleet) if fleet.tolerances else None,
         "warnings": texts_of(fleet.messages),
         "error_classes": dict(Counter(e.error_class for e in fleet.errors.values())),
-        "error_groups": _error_groups(fleet),
+        "error_groups": error_groups(fleet),
         "outliers": listed,
         "outliers_in_all": len(outliers(fleet)),
         "outliers_from": _centre(fleet),

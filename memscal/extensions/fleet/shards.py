@@ -24,10 +24,11 @@ from memscal.model.quantities import ESTIMATED, MM, PER_MM, PER_MM2, parameter_q
 from memscal.version import __version__
 
 FLEET_SCHEMA = "memscal-fleet"
-FLEET_SCHEMA_VERSION = "1.2.0"
+FLEET_SCHEMA_VERSION = "1.3.0"
 DIGEST = "memscal_shard_sha256"
-#: What states the batch, and the bytes that it may have; scans that a message names.
-_BATCH = "batch.json"
+BATCH = "batch.json"
+"""File that states a batch."""
+#: Bytes that it may have; scans that a message names.
 _MOST_STATED = 100_000
 _NAMED = 5
 TABLE_SUFFIXES = (".csv", ".tsv", ".txt", ".dat", ".xlsx", ".parquet", ".tdms")
@@ -44,6 +45,7 @@ class FleetScan:
     wafer_x: float | None = None
     wafer_y: float | None = None
     sensor: str = ""
+    place_unit: str = "mm"  # or "die", where columns and rows are counted
 
 
 def expanded(sources: Iterable[Path]) -> list[Path]:
@@ -72,20 +74,11 @@ def manifest_scans(
     if source.is_dir():
         yield from _folder_scans(source, suffixes)
         return
-    if not source.is_file():
-        raise InputError(
-            f"{source} is neither a folder nor a regular file.",
-            cure="Give a folder of scans, or a text file that lists one scan a line.",
-        )
     try:
-        with source.open(encoding="utf-8-sig", newline="") as lines:
-            yield from _listed_scans(source.name, lines)
+        lines = read_bytes(source).decode("utf-8-sig").splitlines()
+        yield from _listed_scans(source.name, lines)
     except (UnicodeDecodeError, csv.Error) as error:
         raise FormatError(f"{source} is not a table of text: {error}.") from error
-    except OSError as error:
-        raise InputError(
-            f"{source} cannot be read: {error.strerror}.", cure="Give a manifest that you may read."
-        ) from error
 
 
 def _folder_scans(folder: Path, suffixes: tuple[str, ...]) -> Iterator[FleetScan]:
@@ -96,7 +89,7 @@ def _folder_scans(folder: Path, suffixes: tuple[str, ...]) -> Iterator[FleetScan
                 yield FleetScan(path.relative_to(folder).as_posix())
 
 
-def _listed_scans(name: str, lines: Iterator[str]) -> Iterator[FleetScan]:
+def _listed_scans(name: str, lines: Iterable[str]) -> Iterator[FleetScan]:
     """Read a table with a column ``path``, or without a head a path a line, commas included."""
     head: list[str] = []
     for number, line in enumerate(lines, start=1):
@@ -119,17 +112,17 @@ def _listed_scans(name: str, lines: Iterator[str]) -> Iterator[FleetScan]:
                 cure="Give the place on the wafer in mm, or leave it empty.",
             ) from error
         if not row.get("path"):
-            raise FormatError(f"{name}, line {number} has no path.", cure="Add it.")
-        yield FleetScan(row["path"], place[0], place[1], row.get("sensor") or "")
+            raise FormatError(f"{name}, line {number} has no path.")
+        sensor = row.get("sensor") or ""
+        yield FleetScan(row["path"], place[0], place[1], sensor, row.get("place_unit") or "mm")
 
 
 def _require_places(name: str, head: Sequence[str]) -> None:
-    for place in ("wafer_x", "wafer_y"):
-        other = next((cell for cell in head if cell.startswith(place) and cell != place), None)
-        if other is not None:
+    for cell in head:
+        if cell.startswith(("wafer_x", "wafer_y")) and cell[7:]:
             raise FormatError(
-                f"{name} has a column {other!r}, which is not read.",
-                cure=f"Give places on the wafer in mm, in a column {place}.",
+                f"{name} has a column {cell!r}, which is not read.",
+                cure=f"Give places on the wafer in mm, in a column {cell[:7]}.",
             )
 
 
@@ -277,22 +270,38 @@ def shard_paths(results: Path) -> list[Path]:
     return sorted((results / "shards").glob("shard-*.parquet"))
 
 
-def write_batch(results: Path, stated: Values) -> None:
-    """State what a batch is, for those that continue or summarise it."""
+def write_batch(path: Path, stated: Values) -> None:
+    """State what a batch or an import is, for those that continue or summarise it."""
     text = json.dumps({"schema": FLEET_SCHEMA, "version": FLEET_SCHEMA_VERSION, **stated}, indent=2)
-    atomic_write_bytes(results / _BATCH, f"{text}\n".encode(), overwrite=True)
+    atomic_write_bytes(path, f"{text}\n".encode(), overwrite=True)
 
 
-def read_batch(results: Path) -> Values:
-    """Return what the batch of some results states of itself; nothing where that is not known."""
+def read_batch(path: Path) -> Values:
+    """Return what a batch or an import states of itself; nothing where that is not known."""
     with suppress(MemscalError, ValueError, RecursionError):
-        stated = json.loads(read_bytes(results / _BATCH, limit=_MOST_STATED))
+        stated = json.loads(read_bytes(path, limit=_MOST_STATED))
         if isinstance(stated, dict) and all(
-            isinstance(stated.get(key), int) and 0 < stated[key] < 2**31
-            for key in ("scans", "shard_size")
+            stated.get(key, 1) in range(1, 2**31) for key in ("scans", "shard_size")
         ):
             return stated
     return {}
+
+
+def require_same(path: Path, stated: Mapping[str, str]) -> None:
+    """Refuse to go on with other options than a file states of what was begun, and name each."""
+    before = read_batch(path).get("options", {})
+    absent = "not stated"
+    changed = [
+        f"{name}: {before.get(name, absent)}, now {stated.get(name, absent)}"
+        for name in {**before, **stated}
+        if before.get(name) != stated.get(name)
+    ]
+    if changed:
+        raise InputError(
+            f"{path.parent} was begun with other options: {'; '.join(changed)}.",
+            why="Nothing was touched.",
+            cure="Give the options as they were, or another folder; --force does all anew.",
+        )
 
 
 _NUMBERS = (
@@ -311,6 +320,7 @@ _WORDS = (
     "options_sha256",
     "version",
     "unit",
+    "place_unit",
     "input_sha256",
 )
 _SUMMARISED = (*_NUMBERS, *_WORDS, "passed", "error_class", "problem", "cure", "checks", "messages")
@@ -335,17 +345,14 @@ def _messages(table: Any, words: Mapping[str, Any], scans: int) -> Iterator[Mess
             repeated.append(path)
         contents.add(digest)
     if repeated:
-        more = len(repeated) - _NAMED
-        tail = f" and {more} more" if more > 0 else ""
         text = f"{len(repeated)} of the scans repeat the content of another one and count again"
-        yield Message("repeated", f"{text}: {', '.join(repeated[:_NAMED])}{tail}.", "warning")
+        yield Message("repeated", f"{text}, as {', '.join(repeated[:_NAMED])}.", "warning")
     overridden: dict[str, str] = {}
     for path, messages in zip(paths, table["messages"], strict=True):
         for message in messages.as_py() or ():
             if message["kind"] == OVERRIDE:
                 overridden.setdefault(path, message["text"])
-    if overridden:
-        path, text = next(iter(overridden.items()))
+    for path, text in [*overridden.items()][:1]:
         text = f"{len(overridden)} scans, the first {path}: {text}"
         yield Message(OVERRIDE, text, "warning")
 
@@ -364,30 +371,29 @@ def read_fleet(results: Path) -> FleetResults:
     paths = words["path"]
     units = sorted(set(words["unit"]) - {None})
     if len(units) > 1:
-        firsts = [paths[words["unit"].index(unit)] for unit in units]
-        kinds = ", ".join(f"{unit} (as {path})" for unit, path in zip(units, firsts, strict=True))
         raise FormatError(
             f"{results} holds sensors of several kinds.",
-            why=f"The conversion constants are in {kinds}.",
+            why=f"The conversion constants are in {' and '.join(units)}.",
             cure="Run a batch for each unit of readings.",
         )
     failing = np.flatnonzero(~table["passed"].to_numpy().astype(bool))
     failed = {}
     errors = {}
     for number, row in zip(failing.tolist(), table.take(failing).to_pylist(), strict=True):
-        checks = row["checks"] or ()
-        failed[number] = tuple(check["name"] for check in checks if not check["passed"])
+        failed[number] = tuple(c["name"] for c in row["checks"] or () if not c["passed"])
         if row["error_class"]:
             errors[number] = Failure(row["error_class"], row["problem"], row["cure"])
-    batch = read_batch(results)
-    names = zip(words["sensor"], paths, strict=True)
+    batch = read_batch(results / BATCH)
     return FleetResults(
         paths=paths,
-        sensors=[sensor or os.path.basename(path) for sensor, path in names],
+        sensors=[
+            sensor or Path(path).stem for sensor, path in zip(words["sensor"], paths, strict=True)
+        ],
         failed=failed,
         errors=errors,
         unit="".join(units),
-        name=os.path.basename(os.path.realpath(results)),
+        place_unit=words["place_unit"][0],
+        name=results.resolve().name,
         messages=tuple(_messages(table, words, batch.get("scans", 0))),
         provenance={
             "method": sorted(set(filter(None, words["method"]))),

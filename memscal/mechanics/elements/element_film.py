@@ -89,10 +89,10 @@ def smooth(line: QuarticLine, values: FloatArray, parity: int) -> ArrayFunction:
     r, weights = gauss_between(line.corners, _ORDER + 1)
     quartic = line.at(r) @ values
     weights = np.sqrt(weights * r)
-    knots = np.concatenate([line.r[2:-1:2], np.full(_SMOOTH_DEGREE + 1, line.r[-1])])
+    knots = np.append(line.r[2:-1:2], np.full(_SMOOTH_DEGREE + 1, line.r[-1]))
 
     def mirrored(half: FloatArray, sign: int) -> FloatArray:
-        return np.concatenate([sign * half[::-1], half])
+        return np.append(sign * half[::-1], half)
 
     # Mirrored about the axis, so that what is fitted has the right symmetry.
     table = mirrored(r, -1), mirrored(quartic, parity), mirrored(knots, -1)
@@ -219,7 +219,7 @@ def field_mesh(system: MixedSystem, solution: FloatArray, film: ElasticFilm) -> 
     index = index.reshape(inward.shape)
     # The displacement's gradient and the mean pressure at the nodes of every triangle.
     basis = system.displacement
-    rule = (local.T, np.ones(local.shape[0]))
+    rule = (local.T, np.ones(len(local)))
     at_nodes = skfem.Basis(basis.mesh, basis.elem, quadrature=rule)
     moved, pressed = np.split(solution, [basis.N])
     gradient = at_nodes.interpolate(moved).grad
@@ -239,12 +239,12 @@ def field_mesh(system: MixedSystem, solution: FloatArray, film: ElasticFilm) -> 
     mean = averaged(squeeze)
     volume = (radial + vertical + hoop) / 3
     stress = [2 * (strain - volume) - mean for strain in (radial, vertical, hoop)]
-    points = film.thickness * np.stack([r, 1 - depth], axis=1)
+    points = film.thickness * np.column_stack([r, 1 - depth])
     return FieldMesh(
         points=points,
         triangles=anticlockwise(points, np.concatenate(np.moveaxis(index[_QUARTERS], 2, 1))),
         displacement=film.thickness * displacement,
-        stress=film.shear_modulus * np.stack([*stress, -slip], axis=1),
+        stress=film.shear_modulus * np.column_stack([*stress, -slip]),
         notes=f"Linear elastic film, E = {film.young_modulus:g} Pa, nu = {film.poisson_ratio:g}, "
         f"thickness {film.thickness * 1e3:g} mm, bonded at z = 0. Stress positive in tension.",
     )
@@ -306,7 +306,7 @@ class ElementFilm:
     @property
     def discretisation(self) -> str:
         """What was discretised and how finely, in words."""
-        triangles = self.system.mesh.triangles.shape[0]
+        triangles = len(self.system.mesh.triangles)
         return (
             f"finite elements, quartic displacement and cubic pressure (Taylor-Hood): {triangles} "
             f"triangles, {self.system.free.size} unknowns, free edge at {self.radius * 1e3:g} mm"
@@ -317,7 +317,7 @@ class ElementFilm:
         line, outward, inward = self.system.side(0.0)
         hats = line.loads_of_hats(self.r / self.film.thickness)
         modulus = self.film.shear_modulus
-        loads = np.concatenate([hats @ (pressure / modulus), hats @ (shear / modulus)])
+        loads = np.append(hats @ (pressure / modulus), hats @ (shear / modulus))
         solution = self.system.solve(np.append(inward, outward), loads[:, None])
         return ElementField(self.film, self.radius, self.system, solution[:, 0])
 

@@ -55,10 +55,10 @@ def film_triangles(rings: FloatArray, *, radius: float, refinement: int = 1) -> 
     inside = _fitted(rings, sizes)
     growth = 1 + _GROWTH / refinement
     beyond = graded(rings[-1], radius, rings[-1] - inside[-2], growth, sizes.widest)
-    front = _Front(np.concatenate([inside, beyond[1:]]), sizes)
+    front = _Front(np.append(inside, beyond[1:]), sizes)
     while np.any(front.depth < 1.0):
         front.advance()
-    return TriangleMesh(np.array(front.points), np.array(front.triangles, dtype=np.int64))
+    return TriangleMesh(np.array(front.points), np.array(front.triangles, np.int64))
 
 
 @value_record
@@ -149,14 +149,15 @@ class _Front:
 
     def _kept(self, moving: BoolArray, lower: FloatArray) -> BoolArray:
         """Return which nodes the next row has: never do two neighbours drop out."""
-        width = np.pad(self.r[2:] - self.r[:-2], 1)
+        r = self.r
+        width = np.pad(r[2:] - r[:-2], 1)
         slope = _SLOPE / self.sizes.refinement
-        longest = np.minimum(slope * lower, 1.001 * self.sizes.widest(self.r))
+        longest = np.minimum(slope * lower, 1.001 * self.sizes.widest(r))
         # The side that bridges a dropped node must pass well below it.
-        share = (self.r[1:-1] - self.r[:-2]) / np.maximum(width[1:-1], self.r[-1] * 1e-300)
+        share = (r[1:-1] - r[:-2]) / np.maximum(width[1:-1], r[-1] * 1e-300)
         room = np.pad((1 - share) * lower[:-2] + share * lower[2:] - self.depth[1:-1], 1)
         droppable = moving & (width > 0) & (width <= longest) & (room >= _ROOM * width)
-        kept = np.ones(self.r.size, dtype=bool)
+        kept = np.ones(r.size, bool)
         for i in np.flatnonzero(droppable):
             kept[i] = not kept[i - 1]
         return kept
@@ -178,6 +179,6 @@ class _Front:
             self.triangles.extend(triangle for triangle in corners if len(set(triangle)) == 3)
 
     def _length(self, start: int, end: int) -> float:
-        (r1, d1) = self.points[start]
-        (r2, d2) = self.points[end]
+        r1, d1 = self.points[start]
+        r2, d2 = self.points[end]
         return float(np.hypot(r1 - r2, d1 - d2))

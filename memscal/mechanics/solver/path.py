@@ -66,7 +66,7 @@ def _step_at_once(problem: ContactProblem, smooth: ContactState, target: Target)
         return take_step(problem, start, target)
     except ConvergenceError:
         rings = int(np.count_nonzero(start.touching))
-        if problem.interface.normal_law is not None or not np.all(start.touching[:rings]):
+        if problem.interface.normal_law or not np.all(start.touching[:rings]):
             raise
 
     def meeting_at(ring: int) -> ContactState:
@@ -151,7 +151,7 @@ class _Walk:
     def point(self) -> PathPoint:
         energy = _elastic_energy(self.problem, self.state)
         # Where nothing is lost, whatever the way, the energy in the film is the work done.
-        lossless = self.problem.friction == 0 and self.problem.interface.normal_law is None
+        lossless = self.problem.friction == 0 and not self.problem.interface.normal_law
         work = energy if lossless else self.work
         return PathPoint(self.state, self.steps, energy, work, self.dissipated)
 
@@ -179,7 +179,7 @@ def _step_by_step(
         if rising == upward:
             walk = resume
         try:
-            if problem.interface.normal_law is not None:
+            if problem.interface.normal_law:
                 _walk_evenly(walk, target, farthest, increments)
             elif problem.friction == 0:
                 walk.step_to(take_step(problem, walk.state, target))

@@ -43,7 +43,7 @@ def _rings(request: RingRequest, edges: Sequence[float], reach: float, count: in
     distance = r - near[np.searchsorted((near[1:] + near[:-1]) / 2, r)]
     # Where the number of rings passed so far is whole, there is one.
     density = 1 / np.minimum(spacing, np.hypot(_FINEST * spacing, _GROWTH * distance))
-    passed = np.concatenate([[0.0], np.cumsum(np.diff(r) / 2 * (density[1:] + density[:-1]))])
+    passed = np.append(0.0, np.cumsum(np.diff(r) / 2 * (density[1:] + density[:-1])))
     return np.interp(np.arange(math.floor(passed[-1]) + 1), passed, r)
 
 
@@ -233,7 +233,7 @@ def _contact_radius(request: RingRequest, rings: FloatArray, state: ContactState
     if isinstance(request.indenter, Rod):
         return request.indenter.radius
     p = state.pressure
-    if request.interface.normal_law is not None:
+    if request.interface.normal_law:
         # Without an edge: where the pressure has fallen to a small share of its largest.
         last = np.flatnonzero(p > _EDGE * p.max())[-1]
         share = (p[last] - _EDGE * p.max()) / (p[last] - p[last + 1])
@@ -277,7 +277,7 @@ def _change(request: RingRequest, fine: Contact, coarse: Contact) -> float:
 def relative_change(fine: Contact, coarse: Contact, r: FloatArray) -> float:
     """Return the largest relative change of base stress at ``r`` (m), load and depth."""
     stress = fine.base_stress(r)
-    by_stress = np.max(np.abs(stress - coarse.base_stress(r))) / np.max(np.abs(stress))
+    by_stress = np.max(abs(stress - coarse.base_stress(r))) / np.max(abs(stress))
     by_load = abs(coarse.load / fine.load - 1)
     by_depth = abs(coarse.depth / fine.depth - 1)
     return float(max(by_stress, by_load, by_depth))

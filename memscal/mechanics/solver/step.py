@@ -55,7 +55,7 @@ class ContactProblem:
 
     def displacements(self, p: FloatArray, q: FloatArray) -> ArrayPair:
         """Return depression and outward displacement (m) under tractions (Pa) at the rings."""
-        both = self.compliance.whole @ np.concatenate([p, q])
+        both = self.compliance.whole @ np.append(p, q)
         return both[: p.size], both[p.size :]
 
     def separations(self, state: ContactState) -> FloatArray:
@@ -138,6 +138,7 @@ def _solve_system(problem: ContactProblem, status: _Status, goal: Goal) -> _Tria
     mu = problem.friction
     n = problem.heights.size
     rows = np.flatnonzero(status.pressing)
+    count = rows.size
     off_axis = c.r > 0
     stuck = np.flatnonzero(status.pressing & (status.slip == 0) & off_axis) if mu > 0 else rows[:0]
     # Shear of a slipping ring per pressure.  Nothing slips where friction has no bound.
@@ -149,12 +150,12 @@ def _solve_system(problem: ContactProblem, status: _Status, goal: Goal) -> _Tria
     # row is the goal's, from the start that of a ring which the surfaces are to meet.
     unit = c.whole[0, 0]
     ring = goal.ring if isinstance(goal, Touch) else 0
-    unknown = np.concatenate([rows, n + stuck])
+    unknown = np.append(rows, n + stuck)
     equations = c.whole.take(np.append(unknown, ring), axis=0)
-    matrix = np.zeros((equations.shape[0], equations.shape[0]))
+    matrix = np.zeros((len(equations), len(equations)))
     matrix[:, :-1] = equations.take(unknown, axis=1)
     matrix[:, slipping] += equations.take(n + rows[slipping], axis=1) * ratio[slipping]
-    matrix[: rows.size, -1] = matrix[-1, -1] = -unit
+    matrix[:count, -1] = matrix[-1, -1] = -unit
     right = np.concatenate([-problem.heights[rows], status.anchor[stuck], [-problem.heights[ring]]])
     if isinstance(goal, Depth):
         matrix[-1] = 0.0
@@ -163,14 +164,14 @@ def _solve_system(problem: ContactProblem, status: _Status, goal: Goal) -> _Tria
     elif isinstance(goal, Load):
         scale = unit / c.areas.sum()
         matrix[-1] = 0.0
-        matrix[-1, : rows.size] = c.areas[rows] * scale
+        matrix[-1, :count] = c.areas[rows] * scale
         right[-1] = goal.value * scale
     law = problem.interface.normal_law
-    if law is not None:
+    if law:
         # g = 0 becomes g = F^-1(p), linearised at the trial's separation.
         gap = status.separation[rows]
         stiffness = law.stiffness(gap, problem.film)
-        diagonal = np.arange(rows.size)
+        diagonal = np.arange(count)
         matrix[diagonal, diagonal] += 1 / stiffness
         right[diagonal] += gap + law.pressure(gap, problem.film) / stiffness
     if problem.interface.slip_length > 0 and math.isfinite(mu):
@@ -180,16 +181,16 @@ def _solve_system(problem: ContactProblem, status: _Status, goal: Goal) -> _Tria
     except np.linalg.LinAlgError as error:
         raise ConvergenceError(
             "The equations of the contact have no solution.",
-            why=f"{rows.size} rings press and {stuck.size} of them stick, on the way to {goal}.",
+            why=f"{count} rings press and {stuck.size} of them stick, on the way to {goal}.",
             cure="Check film, indenter and loads, and their units; try another number of rings.",
         ) from error
 
     pressure = np.zeros(n)
     shear = np.zeros(n)
-    pressure[rows] = solution[: rows.size]
-    shear[rows] = ratio * solution[: rows.size]
-    shear[stuck] = solution[rows.size : -1]
-    depth = float(solution[-1]) * unit
+    pressure[rows] = solution[:count]
+    shear[rows] = ratio * solution[:count]
+    shear[stuck] = solution[count:-1]
+    depth = solution[-1] * unit
     w, u = problem.displacements(pressure, shear)
     return _Trial(pressure, shear, depth, problem.heights - depth + w, u)
 
@@ -238,7 +239,7 @@ def take_step(
     law = problem.interface.normal_law
     pressing = start.touching.copy()
     separation = np.zeros_like(problem.heights)  # counts where the interface is compliant alone
-    if law is not None:
+    if law:
         separation = problem.separations(start)
         pressing = _bearing(problem, law, separation)
     held = goal.ring if isinstance(goal, Touch) else None
@@ -288,9 +289,9 @@ def _revise(
     slip = _revised_slip(problem, status, trial, careful)
     settled = np.array_equal(slip, status.slip)
     law = problem.interface.normal_law
-    if law is None:
+    if not law:
         # Let go of rings that pull, and catch rings that would pass through the indenter.
-        pull = -p / np.abs(p).max(initial=1e-300)
+        pull = -p / abs(p).max(initial=1e-300)
         overlap = -separation / max(abs(trial.depth), 1e-300)
         wrong = np.where(status.pressing, pull, overlap)
         if held is not None:
@@ -308,7 +309,7 @@ def _revise(
         pressing = _bearing(problem, law, separation)
     stretch = status.stretch
     if not problem.interface.rigid:
-        settled &= bool(np.abs(p - status.pressure).max() <= _SETTLED * p.max())
+        settled &= abs(p - status.pressure).max() <= _SETTLED * p.max()
         length = problem.interface.slip_length
         stretch = np.clip(trial.outward - status.anchor, -length, length)
     return _Status(pressing, slip, status.anchor, separation, p, stretch), settled
@@ -335,15 +336,15 @@ def _revised_slip(
     sticks = status.slip == 0
     stretch = u - status.anchor
     length = problem.interface.slip_length
-    excess = (np.abs(q) - mu * p) / (mu * np.abs(trial.pressure).max())
+    excess = (abs(q) - mu * p) / (mu * abs(trial.pressure).max())
     # A slipping ring stretches the interface by its slip length, against the shear; on the axis
     # nothing slips.
-    pushed = (status.slip * stretch + length) / (np.abs(u).max() + length)
+    pushed = (status.slip * stretch + length) / (abs(u).max() + length)
     pushed *= problem.compliance.r > 0
     changing = _changing(np.where(sticks, excess, pushed) * status.pressing, careful)
     # A ring that friction would push on far enough to slip back does so at once (the trial shear
     # of Alart and Curnier); sticking first, it could go back and forth for ever.
     turn = 2 * mu * p * problem.compliance.radial
-    turns = np.abs(stretch) > np.maximum(turn, length)
+    turns = abs(stretch) > np.maximum(turn, length)
     turned = np.where(turns, -np.sign(stretch), 0)
     return np.where(changing, np.where(sticks, np.sign(q), turned), status.slip)

@@ -44,10 +44,27 @@ def test_all_that_is_not_stated_is_named_in_one_list_with_its_cure(apparatus, la
         certify(lacking, stating(laboratory, "person", role=None))
     names = ("gain", "position-scale", "load", "thickness", "radius")
     cures = [f": memscal import --{name}-uncertainty" for name in names]
-    cures += [": memscal explain symmetry", ": [person] role in lab.toml"]
+    cures += ["checks (symmetry): memscal explain CHECK", ": [person] role in lab.toml"]
     assert [cure for cure in cures if cure not in refusal.value.problem] == []
     made = certify(lacking, laboratory, incomplete=True)
     assert (len(made.missing), made.conformity) == (6, ())
+
+
+def test_a_gaussian_that_the_scan_rejects_is_not_certified_and_checks_are_listed_once(
+    apparatus, laboratory, certificate
+):
+    page = certificate_page(page_of(certificate))
+    assert "0.9500 – 1.1000" in page
+    assert "<td>(1.000 ± 0.020) N</td>" in page
+    assert "correlation of neighbouring readings: none is large enough" in page
+    failed = [replace(check, passed="gaussian" not in check.name) for check in apparatus.checks]
+    rejected = replace(apparatus, checks=tuple(failed))
+    made = certify(rejected, laboratory, incomplete=True)
+    names = [value.quantity.name for value in made.undetermined]
+    assert names == ["gaussian_sigma", "gaussian_sigma_deconvolved"]
+    page = certificate_page(page_of(made))
+    assert "it lacks: passed quality checks (gaussian misfit, gaussian evidence).</p>" in page
+    assert "σ (the scan shows a departure from a Gaussian)" in page
 
 
 def test_an_incomplete_certificate_is_written_without_anything_of_the_file(apparatus, laboratory):

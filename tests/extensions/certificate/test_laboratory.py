@@ -42,7 +42,7 @@ def read(text):
         ("[conditions]\nstart_time = 'noon'", "2026-11-20T09:30:00+01:00"),
         ("[[equipment]]\nname = 'a'\ndate = 2026-01-01T10:00:00", "be a date"),
         ("[[equipment]]\nkind = 'stage'\n[[equipment]]\nkind = 'stage'", "more than one stage"),
-        ("[[equipment]]\nkind = 'volt meter'", "one of load cell, voltmeter, stage"),
+        ("[[equipment]]\nkind = 'volt meter'", "or left out (did you mean voltmeter?)."),
         ("[certificate]\nlanguage = 'xx'", "should be en"),
         ("[equipment]\nname = 'a'", "[[equipment]]"),
         ("[sensor\n", "no TOML"),

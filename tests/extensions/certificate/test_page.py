@@ -133,4 +133,4 @@ def test_synthetic_data_and_failed_checks_are_said_first(apparatus, laboratory, 
     text = text_of(certify(lacking, laboratory, incomplete=True))
     assert "SYNTHETIC" not in text
     assert "INCOMPLETE" in text[:600]
-    assert "lacks: a passed check of symmetry." in text[:600]
+    assert "lacks: passed quality checks (symmetry)." in text[:600]

@@ -87,6 +87,7 @@ def test_tables_are_imported_each_by_itself_and_named_by_their_files(run, tables
         "sensor": ["die_0_7", "die_1_7"],
         "wafer_x": [35, 35],
         "wafer_y": [0, 4],
+        "place_unit": ["mm", "mm"],
     }
     scan = memscal.read_scan("scans/die_1_7.h5")
     assert scan.sensor.name == "die_1_7"
@@ -96,6 +97,12 @@ def test_tables_are_imported_each_by_itself_and_named_by_their_files(run, tables
     again = run(*line, *named, "--resume", "--json").exits(0).json
     assert (again["kept"], again["read"]) == (2, 1)
     assert Path("scans/die_0_7.h5").stat().st_mtime_ns == before
+    change("thickness = 2.03", "thickness = 1.9")
+    run(*line, *named, "--resume").exits(3, "options: thickness: 2.03, now 1.9.")
+    run(*line, *named[2:], "--resume", "--name-pattern", "die_{rw}_{col}").exits(2, "mean {row}?")
+    assert Path("scans/die_0_7.h5").stat().st_mtime_ns == before
+    run(*line, *named[:2], "--resume", "--force").exits(0, "law neo-hookean. (tables: 3)")
+    assert set(pd.read_csv("scans/manifest.csv")["place_unit"]) == {"die"}
     other = run(*line, "--name-pattern", "chip_{row}", "--force", "--json").exits(1).json
     assert other["problems"][0]["problem"] == "die_0_7.csv is not named as chip_{row}."
 
@@ -128,11 +135,20 @@ def test_a_batch_of_tables_is_that_of_their_scans(run, tables):
     [
         ("thickness = 2.03", 'thickness = "2,03"', "[film] thickness is '2,03'. not a comma."),
         ("thickness = 2.03", "thickness = true", "[film] thickness is True. A flag is true"),
-        ("thickness = 2.03", "thicknes = 2.03", "[film] thicknes is 2.03. Known are young_modulus"),
+        (
+            "thickness = 2.03",
+            "thicknes = 2.03",
+            "[film] thicknes is 2.03. mean thickness in [film]?",
+        ),
+        (
+            "[load]",
+            "[load]\nname_pattern = 1",
+            "[load] name_pattern is 1. name_pattern in [sensor]?",
+        ),
         ('film_law = "neo', 'film_law = "new', "is 'new-hookean'. 'neo-hookean'"),
         ('x = "x"', 'x = ["x", "y"]', "[table] x is ['x', 'y']. text or a number"),
-        ("[film]", "[foil]", "[foil] young_modulus is 2.1. table, film, indenter"),
-        ("[table]", "holds = 1\n[table]", "recipe.toml: [holds]  is 1."),
+        ("[film]", "[foil]", "[foil] young_modulus is 2.1. young_modulus in [film]"),
+        ("[table]", "holds = 1\n[table]", "recipe.toml: [holds] holds is 1. holds in [table]"),
         ("[table]", "[table", "is no TOML"),
     ],
 )

@@ -70,6 +70,8 @@ def test_the_summary_says_from_what_outliers_are_told():
     assert mapping(wafer(rng, 24))["outliers_from"] == "trend"
     few = wafer(rng, 23)
     assert mapping(few)["outliers_from"] == "median"
+    for unit, label in (("mm", "$x$ on the wafer (mm)"), ("die", "column of dies")):
+        assert label in [a.get_xlabel() for a in replace(few, place_unit=unit).plot().axes]
     assert "a trend takes 24 calibrated sensors" in str(replace(few, failed={0: ("symmetry",)}))
 
 
@@ -123,7 +125,7 @@ def test_the_interval_of_the_yield_holds_it(share):
 def test_errors_that_differ_in_names_and_numbers_are_one_kind():
     errors = {
         0: Failure("FormatError", "die_0.h5, line 3: '1,5' is not a number.", "Write a point."),
-        1: Failure("FormatError", "die_1.h5, line 20: '7,1' is not a number.", "Write a point."),
+        1: Failure("FormatError", "die_1.h5, line 20: 'much' is not a number.", "Write a point."),
         2: Failure("InputError", "die_2.h5 is not there. It may be hidden.", "Look."),
     }
     fleet = wafer(np.random.default_rng(1), 30, failed=dict.fromkeys(errors, ()), errors=errors)
