@@ -105,5 +105,5 @@ def test_the_command_gives_no_number_to_a_wave_that_is_not_resolved(run, artifac
     assert second["frequency"] == {"value": 2.0, "unit": "Hz"}
     assert "not resolved" in run(*line).out
     refused = run(*line, "--length", 50, "--noise-record", good_scan).exits(3)
-    assert "noise record is needed" in refused.err
+    assert "is no noise record" in refused.err
     assert "above 0 (in mm)" in run("response", artifact, "--wavelength", -1).exits(2).err
