@@ -75,7 +75,9 @@ def _draw_smallest(axes: Axes, seen: Response, wavelength: FloatArray) -> None:
     smallest = _at(seen, wavelength, speed).smallest_stress
     levels = 10 ** (np.floor(np.log10(np.nanmin(smallest))) + np.arange(_DECADES))
     lines = axes.contour(wavelength / MM, speed / MM, smallest, levels, colors=DECONVOLVED)
-    axes.clabel(lines, fmt=_in_pascals, fontsize=7)
+    # Set into the line, a label on axes of logarithms would cut out much of it.
+    for label in axes.clabel(lines, fmt=_in_pascals, fontsize=7, inline=False):
+        label.set_bbox({"color": "white", "pad": 0.5})
     if noise.corner:
         corner = noise.corner * wavelength / MM
         axes.plot(wavelength / MM, corner, color=FAILED, ls="--", label="drift rules below")
