@@ -71,4 +71,5 @@ PUBLIC = {
 }
 """Module: its public names."""
 
-__getattr__, __dir__, __all__ = lazy_loader.attach(__name__, submod_attrs=PUBLIC)
+__getattr__, __dir__, __all__ = lazy_loader.attach(__name__, ["acquire"], PUBLIC)
+__all__.remove("acquire")  # a module with names of its own

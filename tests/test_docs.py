@@ -21,6 +21,7 @@ from helpers.bounds import FULL
 from helpers.console import numbers, words
 from helpers.folders import SHIPPED
 from helpers.scans import simulate
+from ophyd.sim import SynAxis, SynSignal
 
 import memscal
 from memscal.cli import main
@@ -318,7 +319,7 @@ def test_the_recipe_with_pymeasure_records_a_scan_that_can_be_calibrated(
     monkeypatch.chdir(tmp_path)
     scan = simulate(points=33, noise=0.0)
     bench = Bench(scan, noise=0.005 * scan.u_zz.max(), seed=seed)
-    procedure, run = blocks("acquisition.md", "python")
+    procedure, run, *_ = blocks("acquisition.md", "python")
     names = {"__name__": "recipe"}
     exec(compile(procedure, "acquisition.md", "exec"), names)
     names |= {"STAGE": bench.stage, "VOLTMETER": bench.voltmeter, "sleep": lambda _: None}
@@ -330,6 +331,45 @@ def test_the_recipe_with_pymeasure_records_a_scan_that_can_be_calibrated(
     found = memscal.load_apparatus("sensor.apparatus.h5").parameters
     for name in ("conversion_constant", "gaussian_sigma"):
         assert abs(found[name] - scan.synthetic[name]) < 5 * found.uncertainty(name)
+
+
+def test_the_recipe_with_bluesky_stops_when_it_knows_enough_and_its_files_are_imported(
+    tmp_path, monkeypatch, seed
+):
+    monkeypatch.chdir(tmp_path)
+    plan, settings, run, files = blocks("acquisition.md", "python")[2:]
+    names = {}
+    for block in (plan, settings, files):
+        exec(compile(block, "acquisition.md", "exec"), names)
+    made = simulate(rod=names["rod"], half_range=12e-3, points=193, noise=0.0, **names["known"])
+    random = np.random.default_rng(seed)
+    stage, lift = (SynAxis(name=name) for name in ("stage", "lift"))
+
+    def read():
+        volts = np.interp(1e-3 * stage.position, made.x, made.u_zz)
+        noise = 0.005 * made.u_zz.max() * random.standard_normal()
+        return 1e3 * (volts + noise) * (lift.position == 0)
+
+    names |= {
+        "stage": stage,
+        "lift": lift,
+        "sensor": SynSignal(func=read, name="sensor"),
+        "REST": 0,
+    }
+    exec(compile(run, "acquisition.md", "exec"), names)
+    assert lift.position > 0
+    places = memscal.acquire.positions(names["planned"])
+    live = names["live"]
+    read = live.scan()
+    assert 20 < read.x.size < places.size
+    np.testing.assert_allclose(read.x, places[: read.x.size], atol=1e-12)
+    a = live.result.apparatus.parameters.uncertainty("conversion_constant")
+    assert abs(live.result.apparatus.conversion_constant - 1e-7) < 5 * a <= 0.15e-7
+    for line in blocks("acquisition.md", "console")[3].strip().splitlines():
+        assert main(shlex.split(line)[1:]) == 0
+    for name in ("from_table.h5", "from_file.h5"):
+        scan = memscal.read_scan(name)
+        np.testing.assert_allclose([scan.x, scan.u_zz], [read.x, read.u_zz], rtol=1e-9, atol=1e-15)
 
 
 def test_notebooks_are_stored_with_outputs_and_nothing_of_a_machine():

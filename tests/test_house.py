@@ -39,6 +39,7 @@ FLOW = [
     "figures",
     "cli",
     "extensions",
+    "acquire",
     "__main__",
 ]
 """The rooms in the order in which data passes them; a room imports only from those before it."""

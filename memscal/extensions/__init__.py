@@ -88,8 +88,10 @@ HOOKS = {
     "kind_of_record": "extensions.recorded.kinds",
     "open_record": "extensions.recorded.kinds",
     "is_mesh": "extensions.meshes.mesh_files",
+    "LiveScan": "extensions.acquisition.live_scan",
     "monte_carlo": "extensions.monte_carlo.monte_carlo",
     "place_in_name": "extensions.fleet.recipe",
+    "positions": "extensions.acquisition.positions",
     "press_at_finite_strain": "extensions.finite_strain.solve",
     "read_laboratory": "extensions.certificate.laboratory",
     "read_recipe": "extensions.fleet.recipe",
@@ -117,7 +119,7 @@ PUBLIC = {
 }
 """Module of an extension: its names that are public as ``memscal.NAME``."""
 
-USES = {"planning": ["simulation"]}
+USES = {"planning": ["simulation"], "acquisition": ["planning"]}
 """Extension: the other ones that it imports."""
 
 

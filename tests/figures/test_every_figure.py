@@ -3,6 +3,7 @@
 import re
 from functools import cache
 from itertools import combinations, starmap
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -23,11 +24,7 @@ OF_A_COMPARISON = ["", *figure_stems(STATES[:1], interface=True)]
 WITHOUT_UNCERTAINTIES = {"contacts", "sweep", "fleet"}
 
 
-class White:
-    corner = 0.5
-
-    def spectral_density(self, frequency):
-        return np.full_like(frequency, 1e-13)
+WHITE = SimpleNamespace(corner=0.5, spectral_density=np.ones_like)
 
 
 @cache
@@ -64,7 +61,7 @@ FIGURES = {
     "contacts": lambda _: contacts()[0].plot(beside=contacts()[1:]),
     "design": lambda _: memscal.design(step=0.5e-3, repeats=2).plot(),
     "response": lambda _: memscal.response(
-        known_apparatus(), 4e-3, 1e-3, noise_record=White(), length=50e-3
+        known_apparatus(), 4e-3, 1e-3, noise_record=WHITE, length=50e-3
     ).plot(),
     "sweep": lambda _: make_sweep().plot(),
     "fleet": lambda _: fleet().plot(),

@@ -28,8 +28,8 @@ _SHORTEST = 0.6
 _AROUND = 10.0
 #: The longest waves that are drawn without others are of so many thicknesses of the film.
 _LONGEST = 10.0
-#: Contours of the smallest stress, from the decade of the smallest of all.
-_LEVELS = np.array([1.0, 3.0, 10.0, 30.0, 100.0])
+#: So many powers of ten of the smallest stress have contours.
+_DECADES = 5
 
 
 def response_figure(seen: Response) -> Figure:
@@ -73,12 +73,15 @@ def _draw_smallest(axes: Axes, seen: Response, wavelength: FloatArray) -> None:
     assert noise is not None
     speed = np.geomspace(seen.speed.min() / _AROUND, seen.speed.max() * _AROUND, _FINE)
     smallest = _at(seen, wavelength, speed).smallest_stress
-    levels = 10 ** np.floor(np.log10(np.nanmin(smallest))) * _LEVELS
+    levels = 10 ** (np.floor(np.log10(np.nanmin(smallest))) + np.arange(_DECADES))
     lines = axes.contour(wavelength / MM, speed / MM, smallest, levels, colors=DECONVOLVED)
-    axes.clabel(lines, fmt=_in_pascals, fontsize=7)
-    corner = noise.corner * wavelength / MM
-    axes.plot(wavelength / MM, corner, color=FAILED, ls="--", label="drift rules below")
-    axes.fill_between(wavelength / MM, corner, color=MUTED, alpha=0.15, lw=0)
+    # Set into the line, a label on axes of logarithms would cut out much of it.
+    for label in axes.clabel(lines, fmt=_in_pascals, fontsize=7, inline=False):
+        label.set_bbox({"color": "white", "pad": 0.5})
+    if noise.corner:
+        corner = noise.corner * wavelength / MM
+        axes.plot(wavelength / MM, corner, color=FAILED, ls="--", label="drift rules below")
+        axes.fill_between(wavelength / MM, corner, color=MUTED, alpha=0.15, lw=0)
     axes.plot([], [], color=DECONVOLVED, label=f"smallest stress, {SIGMAS:g} sigma")
     places = np.meshgrid(seen.wavelength / MM, seen.speed / MM)
     axes.plot(*map(np.ravel, places), "o", color=MEASURED, ms=3)

@@ -33,7 +33,7 @@ def mapping(seen: Response) -> Values:
         if not wave.resolved:
             values["gain"] = None
         waves.append(values)
-    return {"waves": waves}
+    return {"schema_version": "1", "waves": waves}
 
 
 def answer(seen: Response) -> str:

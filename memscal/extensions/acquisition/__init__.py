@@ -1,0 +1,1 @@
+"""A scan while it is recorded: the order of its places, and its calibration as readings arrive."""
