@@ -20,6 +20,8 @@ from .deconvolution.widths import fit_gaussian as fit_gaussian
 from .errors import MemscalError as MemscalError
 from .extensions.fleet.many import FleetCalibration as FleetCalibration
 from .extensions.fleet.many import calibrate_many as calibrate_many
+from .extensions.history.history import History as History
+from .extensions.history.history import history as history
 from .extensions.interface_laws.results import InterfaceComparison as InterfaceComparison
 from .extensions.monte_carlo.monte_carlo import MonteCarlo as MonteCarlo
 from .extensions.monte_carlo.monte_carlo import monte_carlo as monte_carlo

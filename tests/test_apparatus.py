@@ -7,11 +7,10 @@ import pytest
 from helpers.bounds import FULL, root_mean_square, root_mean_square_range
 from helpers.builders import CONVERSION, SIGMA, make_artifact
 from helpers.machine import assert_same_to_rounding
-from helpers.scans import EXACT_FILM, EXACT_ROD, TAILS, as_function, simulate
+from helpers.scans import EXACT_FILM, EXACT_ROD, TAILS, as_function, known_apparatus, simulate
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import dblquad
-from scipy.interpolate import CubicSpline
 from scipy.stats import ncx2, norm
 
 import memscal
@@ -111,28 +110,12 @@ def test_over_the_plane_what_is_uncertain_beside_the_profile_adds_to_a_predictio
     assert more == pytest.approx(np.hypot(along[0], extra), rel=0.05)
 
 
-def test_the_line_spread_of_a_gaussian_is_a_normal_density_of_its_width(apparatus):
-    value, _ = apparatus.line_spread(X)
-    np.testing.assert_allclose(value, norm.pdf(X, 0, SIGMA), atol=1e-6 * norm.pdf(0, 0, SIGMA))
-    with pytest.raises(InputError, match="not finite"):
-        apparatus.line_spread([0.0, np.nan])
-
-
-def test_the_line_spread_varies_as_integrals_of_profiles_that_are_drawn_from_their_covariance():
-    apparatus = memscal.calibrate(simulate(seed=1, points=33), other=False).apparatus
-    profile = apparatus.radial_profile
-    x = np.array([0.0, 0.4e-3, -1.1e-3, 2e-3])
-    y = np.linspace(0.0, profile.r[-1], 4001)
-    # By rounding some eigenvalues are below zero.
-    settings = {"size": 400, "check_valid": "ignore", "method": "eigh"}
-    rng = np.random.default_rng(1)
-    draws = rng.multivariate_normal(profile.g, profile.g_covariance, **settings)
-    profiles = CubicSpline(profile.r, np.vstack([profile.g, draws]), axis=1, extrapolate=False)
-    lines = 2 * np.trapezoid(np.nan_to_num(profiles(np.hypot.outer(x, y))), y)
-    value, uncertainty = apparatus.line_spread(x)
-    np.testing.assert_allclose(value, lines[0], rtol=1e-3, atol=1e-4 * lines[0, 0])
-    # Of 400 draws a standard deviation is known to 3.5 %.
-    np.testing.assert_allclose(uncertainty, lines[1:].std(axis=0), rtol=0.16)
+def test_the_line_spread_of_a_gaussian_is_a_normal_density_as_unsure_as_its_width():
+    value, uncertainty = known_apparatus(width_uncertainty=0.01).line_spread(X)
+    density = norm.pdf(X, 0, SIGMA)
+    change = 0.01 * abs((X / SIGMA) ** 2 - 1) * density
+    np.testing.assert_allclose(value, density, atol=1e-6 * density.max())
+    np.testing.assert_allclose(uncertainty, change, atol=1e-3 * change.max())
 
 
 @pytest.mark.parametrize("place", [0.0, 0.7e-3, 2.3e-3])

@@ -34,6 +34,10 @@ COMMANDS = {
         "extensions.response.command",
         "Find which waves of pressure a sensor resolves, and how small ones.",
     ),
+    "history": (
+        "extensions.history.command",
+        "Say whether a sensor has changed since its last calibrations.",
+    ),
     "simulate": (
         "extensions.simulation.command",
         "Make a synthetic scan, or the scans of an experiment.",
@@ -55,6 +59,7 @@ VIEWS = {
     "MeasuredStress": ("summaries.stress", "figures.stress.measured_stress_figure"),
     "Restoration": ("summaries.restoration", "figures.stress.restoration_figure"),
     "Design": ("extensions.planning.summary", "extensions.planning.figure.design_figure"),
+    "History": ("extensions.history.summary", "extensions.history.figure.history_figure"),
     "FleetResults": ("extensions.fleet.results_summary", "extensions.fleet.figure.fleet_figure"),
     "InterfaceComparison": (
         "extensions.interface_laws.summary",
@@ -108,6 +113,7 @@ HOOKS = {
 
 PUBLIC = {
     "extensions.fleet.many": ["FleetCalibration", "calibrate_many"],
+    "extensions.history.history": ["History", "history"],
     "extensions.interface_laws.results": ["InterfaceComparison"],
     "extensions.monte_carlo.monte_carlo": ["MonteCarlo", "monte_carlo"],
     "extensions.monte_carlo.sweep": ["Sweep"],

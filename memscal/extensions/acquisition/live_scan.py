@@ -162,7 +162,8 @@ class LiveScan:
                 enough = apparatus.resolved_wavenumber >= value
             else:
                 parameters = apparatus.parameters
-                enough = parameters.uncertainty(name) <= value * abs(parameters[name])
+                known = name in parameters
+                enough = known and parameters.uncertainty(name) <= value * abs(parameters[name])
             if not enough:
                 return False
         return True

@@ -37,8 +37,10 @@ def response_figure(seen: Response) -> Figure:
     limit = 2 * math.pi / seen.apparatus.resolved_wavenumber
     longest = max(_LONGEST * seen.film.thickness, *seen.wavelength)
     shortest = min(_SHORTEST * limit, *seen.wavelength)
-    wavelength = np.geomspace(shortest, seen.length or longest, _FINE)
-    heard = seen.noise_record is not None
+    # Where not even the length is resolved, there is no smallest stress to draw.
+    length = seen.length or 0.0
+    heard = length > limit
+    wavelength = np.geomspace(shortest, length if heard else longest, _FINE)
     with panels_of(3.4, 1, 1 + heard, squeeze=False) as (figure, [panels]):
         _draw_gain(panels[0], seen, wavelength)
         if heard:

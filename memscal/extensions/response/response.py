@@ -244,7 +244,7 @@ def response(
         uncertainty=np.where(resolved, uncertainty, np.nan),
         resolved=resolved,
         speed=None if speed is None else _above_zero("The speed", speed, "m/s"),
-        noise_record=None if noise_record is None else _noise_at_rest(noise_record),
+        noise_record=None if noise_record is None else _noise_at_rest(noise_record, held),
         length=length,
     )
 
@@ -261,11 +261,19 @@ def _require_stress(apparatus: ApparatusFunction) -> None:
         )
 
 
-def _noise_at_rest(record: NoiseSpectrum | Scan | str | PathLike[str]) -> NoiseSpectrum:
-    """Return the spectrum of a noise record, or of its file."""
+def _noise_at_rest(
+    record: NoiseSpectrum | Scan | str | PathLike[str], apparatus: ApparatusFunction
+) -> NoiseSpectrum:
+    """Return the spectrum of a noise record, or of its file, in the unit of a sensor's readings."""
     if isinstance(record, str | PathLike):
         record = read_scan(record)
     if isinstance(record, Scan):
+        if record.unit != apparatus.reading.si:
+            raise InputError(
+                f"The readings of the noise record are in {record.unit}, those of the artifact in "
+                f"{apparatus.reading.si}.",
+                cure="Give a record of this sensor, or correct the unit of its readings.",
+            )
         return noise_of(record)
     if not isinstance(record, NoiseSpectrum):
         raise InputError(

@@ -45,9 +45,7 @@ def answer(seen: Response) -> str:
     lines[0] += f"{shortest / MM:.3g} mm or longer."
     noise = seen.noise_record
     if noise is not None and np.any(seen.frequency < noise.corner):
-        lines.append(
-            f"Below {noise.corner:.3g} Hz drift rules the noise: move faster, or state a baseline."
-        )
+        lines.append(f"Below {noise.corner:.3g} Hz drift rules the noise: move faster.")
     return "\n".join(lines)
 
 

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from helpers.outside import answers
-from helpers.scans import CONVERSION, EXACT_FILM, SIGMA, known_apparatus
+from helpers.scans import CONVERSION, EXACT_FILM, SIGMA, known_apparatus, simulate
 from helpers.schemas import faults
 
 import memscal
@@ -81,6 +81,7 @@ def test_speeds_make_rows_and_are_drawn_with_the_corner_of_the_drift():
         ({"friction": np.inf}, "friction is inf"),
         ({"length": 0.1, "speed": 1.0}, "one is not given"),
         ({"noise_record": WHITE, "length": 1e-3, "speed": 1.0}, "holds no wave of 8 mm"),
+        ({"noise_record": replace(simulate(), unit="A"), "length": 0.1, "speed": 1.0}, "are in A"),
         ({"apparatus": replace(SENSOR, film=None)}, "states no film"),
         (
             {"apparatus": replace(SENSOR, sensor=replace(SENSOR.sensor, channel="xz"))},

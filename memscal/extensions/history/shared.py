@@ -1,0 +1,120 @@
+r"""What calibrations of a sensor have in common: the covariance of their values.
+
+.. math::
+
+    C_{ij} = \sum_s c_{si}\,c_{sj}\,[i\ \text{and}\ j\ \text{used the same thing for}\ s]
+    + \delta_{ij}\,u_i^2,
+
+with the signed effects c of each source by one standard uncertainty, as the artifacts state them.
+What is not named counts as another thing at each date.
+"""
+
+from collections.abc import Hashable, Sequence
+
+import numpy as np
+
+from memscal.axisymmetry.hankel import hankel_transform
+from memscal.model.apparatus import ApparatusData, round_wavenumbers
+from memscal.model.arrays import FloatArray, floats
+from memscal.model.instrument import Equipment
+
+THINGS = {
+    "film": "memscal import --film-name",
+    "indenter": "memscal import --indenter-name",
+    "load_cell": "serial and certificate in lab.toml",
+    "stage": "serial and certificate in lab.toml",
+}
+"""Things that calibrations may share, by their attributes in artifacts, and what names them."""
+
+#: Sources of uncertainty that belong to a thing.  The sensor is the same at all dates.
+_SOURCES = {
+    "film": "thickness poisson_ratio young_modulus mooney_rivlin_ratio roughness base_slip "
+    "regularisation window misfit model_form reference_force reference_convergence "
+    "reference_stress",
+    "indenter": "rod_radius rod_friction",
+    "load_cell": "load",
+    "stage": "position_scale",
+    "sensor": "roundness shear_sensitivity gain_curvature baseline_curvature",
+}
+THING_OF = {source: thing for thing, text in _SOURCES.items() for source in text.split()}
+"""Thing that an uncertainty belongs to, by its source; of others each date has its own."""
+
+#: Sources whose size each scan finds anew, and mostly without a sign.
+_HIDDEN = ("regularisation", "window", "misfit", "baseline_curvature")
+
+
+def identity(apparatus: ApparatusData, thing: str) -> Hashable:
+    """Return what tells a thing from another one, ``None`` where that is not stated."""
+    used = getattr(apparatus, thing, None)
+    if isinstance(used, Equipment):
+        which = used.serial_number or used.name
+        # A new certificate is another error.
+        return (which, used.certificate) if which and used.certificate else None
+    if thing == "film":
+        # What regularisation hides of G depends on the method, too.
+        method = str(apparatus.process.configuration.get("method"))
+        return (used.name, method) if used is not None and used.name else None
+    if thing == "sensor":
+        return thing
+    return getattr(used, "name", "") or None
+
+
+def common_wavenumbers(apparatuses: Sequence[ApparatusData]) -> FloatArray:
+    """Return the wavenumbers, in rad/m, at which all artifacts state effects on A G."""
+    found = [round_wavenumbers(apparatus.resolved_wavenumber) for apparatus in apparatuses]
+    common = found[0]
+    for k in found[1:]:
+        common = common[np.isin(common, k)]
+    return common if all(apparatus.shared_effects for apparatus in apparatuses) else common[:0]
+
+
+def logarithms(apparatus: ApparatusData, k: FloatArray) -> FloatArray:
+    """Return ln A, ln sigma and ln A G(k) of an artifact (2 + m,)."""
+    profile = apparatus.radial_profile
+    a = apparatus.conversion_constant
+    transfer = hankel_transform(profile.r, profile.g, k) if k.size else k
+    return floats(np.log([a, apparatus.gaussian_sigma, *(a * transfer)]))
+
+
+def _effects(apparatus: ApparatusData, source: str, k: FloatArray) -> FloatArray:
+    """Return the changes (2 + m,) of the logarithms by a source."""
+    stated = apparatus.shared_effects.get(source)
+    if stated is None:
+        return np.zeros(2 + k.size)
+    kept = np.isin(round_wavenumbers(apparatus.resolved_wavenumber), k)
+    return floats(stated[np.append([True, True], kept)])
+
+
+def covariances(apparatuses: Sequence[ApparatusData], k: FloatArray) -> FloatArray:
+    """Return the covariance between dates of each pair of logarithms, (2 + m, 2 + m, n, n).
+
+    Of noise and what else each date has of its own only A and sigma are known together.
+    """
+    size = 2 + k.size
+    count = len(apparatuses)
+    total = np.zeros((size, size, count, count))
+    sources = {source: None for one in apparatuses for source in one.shared_effects}
+    for source in sources:
+        effects = np.array([_effects(one, source, k) for one in apparatuses])
+        used = [identity(one, THING_OF.get(source, "")) for one in apparatuses]
+        same = np.eye(count, dtype=bool)
+        for i, thing in enumerate(used):
+            same[i] |= [thing is not None and thing == other for other in used]
+        if source in _HIDDEN:
+            # The error behind it is one.
+            effects = same @ effects / np.sum(same, axis=1)[:, None]
+        products = np.einsum("iq,jp->qpij", effects, effects)
+        if source == "noise":
+            products *= np.eye(size)[:, :, None, None]
+        total += products * same
+    for i, apparatus in enumerate(apparatuses):
+        _add_joint(total[:2, :2, i, i], apparatus)
+    return total
+
+
+def _add_joint(total: FloatArray, apparatus: ApparatusData) -> None:
+    """Add what an artifact states of A and sigma at one date beyond the sources."""
+    names = ("conversion_constant", "gaussian_sigma")
+    stated = apparatus.parameters.only(names)
+    relative = stated.covariance / np.outer(stated.values, stated.values)
+    total += np.where(np.eye(2) * bool(apparatus.shared_effects), 0.0, relative - total)
