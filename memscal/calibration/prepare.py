@@ -129,9 +129,8 @@ def prepare(as_stated: Sequence[Scan], request: Request) -> Prepared:
     stresses = list(map(reference_profile, scans, references))
     peak = None
     per = stresses[0].unit
-    if request.relative:
+    if request.relative:  # a point has no largest value, but a unit integral
         peak = float(abs(stress_table(stresses[0]).sigma_zz).max())
-        # A point has no largest value, but a unit integral.
         per = RELATIVE if peak else f"{RELATIVE} {per}"
         peak = peak or 1.0
     scans = [at_load_of(stress, s, peak) for s, stress in zip(scans, stresses, strict=True)]

@@ -113,10 +113,6 @@ def scan_from(file: SafeFile, most: int | None = None) -> Scan:
     reference = None
     if file.has("/entry/reference"):
         reference = groups.read_profile(file, load=load["load"])
-    record = None
-    if file.has(_NOISE):
-        of_record = reading_of(file.units_of(f"{_NOISE}/u_zz") or "V", file.where(_NOISE))
-        record = Scan(**_read_rest(file, _NOISE, of_record))
     contact = read_record(records.SAMPLE, file, _SAMPLE)
     contact["lubrication"] = contact.get("lubrication", "").strip().lower()
     return Scan(
@@ -136,10 +132,18 @@ def scan_from(file: SafeFile, most: int | None = None) -> Scan:
         title=file.optional_text("/entry/title"),
         notes=file.optional_text("/entry/notes/data"),
         reference=reference,
-        noise_record=record,
+        noise_record=_read_record(file),
         synthetic=_read_synthetic(file),
         source=file.source,
     )
+
+
+def _read_record(file: SafeFile) -> Scan | None:
+    """Read the noise record that travels with a scan."""
+    if not file.has(_NOISE):
+        return None
+    reading = reading_of(file.units_of(f"{_NOISE}/u_zz") or "V", file.where(_NOISE))
+    return Scan(**_read_rest(file, _NOISE, reading))
 
 
 def _read_rest(file: SafeFile, path: str, reading: Reading) -> Values:

@@ -55,13 +55,7 @@ def dry_against_lubricated(
     places = _common_places(averaged[0].offset, averaged[1].offset)
     if places[0].size < _FEWEST_PLACES:
         return None
-    common = []
-    for points, chosen in zip(averaged, places, strict=True):
-        arrays = {name: getattr(points, name)[chosen] for name in _BY_POINT}
-        if points.correlation is not None:
-            arrays["correlation"] = points.correlation[np.ix_(chosen, chosen)]
-        common.append(replace(points, **arrays))
-    dry, lubricated = common
+    dry, lubricated = map(_at_places, averaged, places)
     dry_contact = predict(dry, sensor, frictionless.family, pair[0])
     lubricated_contact = predict(lubricated, sensor, frictionless.family, pair[1])
 
@@ -113,6 +107,14 @@ def dry_against_lubricated(
         relative=maximum / lubricated_profile.maximum,
         relative_uncertainty=maximum_uncertainty / lubricated_profile.maximum,
     )
+
+
+def _at_places(points: LoadPoints, chosen: IndexArray) -> LoadPoints:
+    """Return some of the points, with their correlation."""
+    arrays = {name: getattr(points, name)[chosen] for name in _BY_POINT}
+    if points.correlation is not None:
+        arrays["correlation"] = points.correlation[np.ix_(chosen, chosen)]
+    return replace(points, **arrays)
 
 
 def _averaged(points: LoadPoints) -> LoadPoints:

@@ -60,13 +60,13 @@ baseline_curvature: fitted curvature of the baseline over what its prior and noi
 reference_force: total force of the reference against its load
     check the reference's load and the reach of its table
 indentation: what a neo-Hookean film would change of A or of the width, over its uncertainty
-    state --film-law neo-hookean, or no law, which is then counted; or lighten the load
+    state --film-law neo-hookean, or no law, or lighten the load
 outliers: share of points with less than half of their weight
     find what disturbs these points
 saturation: number of points at a ceiling near the largest voltage (not of a shear)
     lower gain or load, or leave them out (--ceiling)
 noise_as_stated: scatter over the stated noise
-    look for noise of position and load; state the noise, or a noise record
+    look for noise of position and load, or take a noise record
 chi_square: residuals that no radial G, or no radial stress, explains, against the noise
     check reference (rod, film), baseline, stated noise, roundness of a contact
 residual_steps: largest step of the residuals, in standard deviations

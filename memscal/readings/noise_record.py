@@ -15,7 +15,6 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
-from scipy.signal import periodogram
 
 from memscal.errors import FitError, InputError
 from memscal.model.arrays import FloatArray, IndexArray, array_record
@@ -91,6 +90,8 @@ class NoiseRecord:
 
 def noise_of(record: Scan) -> NoiseRecord:
     """Return the noise that a record at rest shows."""
+    from scipy.signal import periodogram
+
     name = record.source.file_name if record.source else "The noise record"
     if record.motion != "rest" or record.time is None:
         raise InputError(

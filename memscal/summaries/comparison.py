@@ -311,7 +311,7 @@ def answer(comparison: FrictionComparison) -> str:
         taken = ""
         if any(moved) and lubrication == "lubricated":
             largest_move = max(filter(None, moved), key=abs)
-            taken = f"; an error of it moves the others by {largest_move:.2f} of that"
+            taken = f"; 0.01 more moves the others by {0.01 * largest_move:.4f}"
         name = (lubrication or "all contacts").capitalize()
         lines.append(f"{name}: μ{_EQUALS[estimates[0].kind]} {stated}{level}{taken}.")
     friction = "\n".join(lines)
