@@ -249,6 +249,12 @@ def test_the_page_on_the_response_runs(folder, run, capsys):
     assert np.all(seen.smallest_stress > 0)
 
 
+def test_the_page_on_histories_runs(folder):
+    history = run_examples("history.md")["history"]
+    assert history.next_date > "2025-11-01"
+    assert {"A", "sigma"} < set(history.quantities)
+
+
 def test_the_page_on_plans_finds_the_repeats_that_it_names(folder, run):
     for line in blocks("plan_a_scan.md", "console")[1].splitlines():
         outcome = run(*shlex.split(line)[1:], "--json").exits(0)
