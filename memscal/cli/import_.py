@@ -47,20 +47,20 @@ if TYPE_CHECKING:
 _SHARED = ("r_unit", "sigma", "sigma_unit", "shear", "sign", "shear_sign", "value", "solver")
 _TABLE_ONLY = ("r",)
 _MESH_ONLY = ("vertical", "base", "centre")
-_READING = ("sheet", "skip_rows", "missing", "delimiter", "decimal")
+READING = ("sheet", "skip_rows", "missing", "delimiter", "decimal")
 _SIGN = click.Choice(["1", "-1"])
 
 
 def _read_reference(path: Path, mesh: bool, options: Options) -> ImportedProfile:
     """Read the reference with the options given; for the others the library's defaults hold."""
-    setting = _stated(options, (*_SHARED, "load", "film", "indenter"))
+    setting = stated_options(options, (*_SHARED, "load", "film", "indenter"))
     if not mesh:
         from memscal.formats.tables.reference import read_reference_table
 
-        setting |= _stated(options, _TABLE_ONLY)
-        return read_reference_table(path, reading=_stated(options, _READING), **setting)
+        setting |= stated_options(options, _TABLE_ONLY)
+        return read_reference_table(path, reading=stated_options(options, READING), **setting)
 
-    setting |= _stated(options, _MESH_ONLY)
+    setting |= stated_options(options, _MESH_ONLY)
     profile: ImportedProfile = hook("read_reference_mesh")(path, **setting)
     return profile
 
@@ -126,7 +126,7 @@ _OF_BOTH = (
     "radius_uncertainty",
     *FILM_NUMBERS,
     *LAW,
-    *_READING,
+    *READING,
 )
 _NEEDED = {"scan": ("x", "u"), "reference": ("sigma",)}
 _NEEDED_WITH_MESH = ("r_unit", "sigma_unit")
@@ -153,7 +153,7 @@ _NAMED = 12
 @option("--name-pattern", "PATTERN")(
     "Scan: what the names of tables state, such as die_{row}_{col}: {row} and {col} the place on "
     "the wafer (to FOLDER/manifest.csv); {sensor} its name, which is otherwise the table's; {any} "
-    "is skipped."
+    "is skipped. {row:COLUMN} takes it from a column with one number."
 )
 @option("--die-pitch", click.FloatRange(0, min_open=True), nargs=2, metavar="MM MM")(
     "Scan: distance of columns and of rows on the wafer, in mm.  [default: places count dies]"
@@ -454,9 +454,9 @@ def _check_usage(path: Path, kind: str, mesh: bool, options: Options) -> None:
     needed = list(_NEEDED[kind])
     if kind == "reference":
         needed += _NEEDED_WITH_MESH if mesh else _TABLE_ONLY
-    elif not _stated(options, ("x", "u")) and hook("kind_of_record")(path) == "HDF5 file":
+    elif not stated_options(options, ("x", "u")) and hook("kind_of_record")(path) == "HDF5 file":
         needed = []  # but what it plots
-    elif _stated(options, ("y", "time", "speed", "step", "motion")):
+    elif stated_options(options, ("y", "time", "speed", "step", "motion")):
         needed.remove("x")  # the library knows what they need, and says it
     missing = [name for name in needed if options[name] is None]
     if missing:
@@ -467,19 +467,19 @@ def _check_usage(path: Path, kind: str, mesh: bool, options: Options) -> None:
     others: Iterable[str] = _OF_REFERENCE
     if kind == "reference":
         others = [name for name in options if name not in (*_OF_REFERENCE, *_OF_BOTH)]
-    misplaced = _stated(options, others)
+    misplaced = stated_options(options, others)
     if misplaced:
         raise click.UsageError(f"{named(misplaced)} belong to --format {other}.")
     if options["value"] is not None and options["load"] is not None:
         raise click.UsageError("Give --load, or --value in its place.")
     if options["rod_friction"] is not None and options["indenter"] == "sphere":
         raise click.UsageError("--rod-friction belongs to --indenter rod.")
-    of_holds = _stated(options, ("depth", "depth_unit", "baseline", "figure"))
+    of_holds = stated_options(options, ("depth", "depth_unit", "baseline", "figure"))
     if of_holds and options["holds"] is None:
         raise click.UsageError(f"{named(of_holds)} belong to --holds.")
     if not mesh and options["shear_sign"] is not None and options["shear"] is None:
         raise click.UsageError("--shear-sign belongs to --shear.")
-    unused = _stated(options, (*_TABLE_ONLY, *_READING) if mesh else _MESH_ONLY)
+    unused = stated_options(options, (*_TABLE_ONLY, *READING) if mesh else _MESH_ONLY)
     if unused and kind == "reference":
         problem = f"A {'mesh' if mesh else 'table'} has no use for {named(unused)}."
         raise click.UsageError(problem)
@@ -492,7 +492,7 @@ def _example(table: Path, missing: Sequence[str], options: Options) -> str:
     columns: Sequence[str] = ()
     if {*missing} <= {"x", "u"}:
         with suppress(MemscalError):
-            columns = open_table(table, **_stated(options, _READING)).names
+            columns = open_table(table, **stated_options(options, READING)).names
     free = [column for column in columns if column not in options.values()]
     if len(free) < len(missing):
         return "See the examples of `memscal import --help`."
@@ -506,7 +506,7 @@ def _example(table: Path, missing: Sequence[str], options: Options) -> str:
     )
 
 
-def _stated(values: dict[str, Any], names: Iterable[str]) -> dict[str, Any]:
+def stated_options(values: dict[str, Any], names: Iterable[str]) -> dict[str, Any]:
     """Return the options that were given, so that the library's own defaults hold."""
     return {name: values[name] for name in names if values[name] is not None}
 
@@ -521,9 +521,9 @@ _UNKNOWN = (
 
 def _set_up(options: Options) -> dict[str, Any]:
     stated: dict[str, Any] = {}
-    if _stated(options, (*FILM_NUMBERS, *LAW, "film_name")):
+    if stated_options(options, (*FILM_NUMBERS, *LAW, "film_name")):
         stated["film"] = film_from(options, _UNKNOWN)
-    if _stated(options, _INDENTER):
+    if stated_options(options, _INDENTER):
         stated["indenter"] = indenter_from(options["indenter"] or "rod", options)
     return stated
 
@@ -538,10 +538,10 @@ def read_table(path: Path, options: Options) -> ImportedScan:
         options = {**options, "sensor_name": options["sensor_name"] or name}
     sensor = {field: options[option] for field, option in _SENSOR_NAMES.items()}
     load_cell = {field: options[option] for field, option in _CELL_NAMES.items()}
-    stated = _stated(options, options)
-    stated["sensor"] = StressSensor(**_stated(sensor, _SENSOR_NAMES))
-    stated["load_cell"] = LoadCell(**_stated(load_cell, _CELL_NAMES))
+    stated = stated_options(options, options)
+    stated["sensor"] = StressSensor(**stated_options(sensor, _SENSOR_NAMES))
+    stated["load_cell"] = LoadCell(**stated_options(load_cell, _CELL_NAMES))
     stated["x_error"] = options["position_error"]
-    columns = _stated(options, ("x", "u", *ARRAYS))
+    columns = stated_options(options, ("x", "u", *ARRAYS))
     scan = import_table(path, **columns, **records_of(stated))
     return with_laboratory(options["lab"], scan)

@@ -8,11 +8,14 @@ from pathlib import Path
 from typing import Any
 
 import click
+import numpy as np
 
-from memscal.cli.import_ import command, prepared
+from memscal.cli.import_ import READING, command, prepared, stated_options
 from memscal.cli.options import Options, Quantity
 from memscal.errors import FormatError, InputError
 from memscal.formats.files import read_bytes
+from memscal.formats.tables.columns import Wanted
+from memscal.formats.tables.sheets import open_table
 
 SECTIONS = {
     "table": "x x_unit y u u_unit u_errors noise u_xz u_yz u_sign ceiling repeat branch time "
@@ -41,6 +44,8 @@ _FIELDS = {
     "sensor": "(?P<sensor>.+)",
     "any": ".*",
 }
+#: A field that a column of the table states, such as {row:Die row}.
+_IN_COLUMN = re.compile(r"\{(row|col|sensor):([^}]+)\}")
 
 
 def read_recipe(context: click.Context, path: Path) -> None:
@@ -104,7 +109,7 @@ def recipe_of(path: Path) -> tuple[Options, Options]:
 
 def expression_of(options: Options) -> str:
     """Return the pattern of names as a regular expression; refuse a field that is not known."""
-    expression = re.escape(options["name_pattern"] or "")
+    expression = re.escape(_IN_COLUMN.sub("", options["name_pattern"] or "")) or ".*"
     for field in re.findall(r"\\{(.*?)\\}", expression):
         if field not in _FIELDS:
             (near,) = get_close_matches(field, _FIELDS, 1, 0)
@@ -113,6 +118,25 @@ def expression_of(options: Options) -> str:
             )
         expression = expression.replace(rf"\{{{field}\}}", _FIELDS[field])
     return expression
+
+
+def _in_columns(path: Path, options: Options) -> dict[str, str]:
+    """Return what columns of a table state, each by one number in all rows."""
+    columns = dict(_IN_COLUMN.findall(options["name_pattern"]))
+    if not columns:
+        return {}
+    table = open_table(path, columns, **stated_options(options, READING))
+    stated = {}
+    for field, values in table.columns({f: Wanted(c) for f, c in columns.items()}).items():
+        numbers = np.unique(values[np.isfinite(values)])
+        if numbers.size != 1:
+            raise InputError(
+                f"{table.where(columns[field])} holds {numbers.size} numbers.",
+                why="One table is of one sensor, at one place on the wafer.",
+                cure="Name a column with one number in all rows, or take it from the file's name.",
+            )
+        stated[field] = f"{numbers[0]:g}"
+    return stated
 
 
 def place_in_name(path: Path, options: Options) -> Options:
@@ -124,7 +148,7 @@ def place_in_name(path: Path, options: Options) -> Options:
             why="{row} and {col} are whole numbers, {sensor} is a name, {any} is skipped.",
             cure="Rename it, or give a --name-pattern that the names of all tables have.",
         )
-    stated = found.groupdict("")
+    stated = found.groupdict("") | _in_columns(path, options)
     columns, rows = options["die_pitch"] or (1.0, 1.0)
     return {
         "sensor": stated.get("sensor", path.stem),

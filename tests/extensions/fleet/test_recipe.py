@@ -55,7 +55,7 @@ def test_every_option_of_an_import_of_scans_has_one_place_in_a_recipe():
     about = {item.name: item.help for item in command.params if isinstance(item, click.Option)}
     others = {name for name, text in about.items() if re.match("Reference|Mesh", text)}
     of_a_run = {"output", "kind", "recipe", "save_recipe", "figure", "as_json", "force"}
-    of_a_run |= {"resume", "dry_run", "debug"}
+    of_a_run |= {"resume", "dry_run", "debug", "motion"}
     assert sorted(keys) == sorted(about.keys() - others - of_a_run)
 
 
@@ -105,6 +105,22 @@ def test_tables_are_imported_each_by_itself_and_named_by_their_files(run, tables
     assert set(pd.read_csv("scans/manifest.csv")["place_unit"]) == {"die"}
     other = run(*line, "--name-pattern", "chip_{row}", "--force", "--json").exits(1).json
     assert other["problems"][0]["problem"] == "die_0_7.csv is not named as chip_{row}."
+
+
+@pytest.mark.usefixtures("tables")
+def test_columns_state_the_place_and_the_number_of_a_sensor(run):
+    plain = Path("dies/die_0_7.csv").read_text(encoding="utf-8").splitlines()
+    for name, die in (("a", 3), ("b", 4)):
+        rows = [f"{plain[0]},die row,nr", *(f"{row},{die},1{die}" for row in plain[1:])]
+        Path(f"{name}.csv").write_text("\n".join(rows), encoding="utf-8")
+    line = ["import", "a.csv", "b.csv", "-o", "scans", "--recipe", "recipe.toml", "--name-pattern"]
+    run(*line, "{row:die row}{sensor:nr}").exits(0)
+    rows = pd.read_csv("scans/manifest.csv")
+    assert [*rows["sensor"]] == [13, 14]
+    assert [*rows["wafer_y"]] == [3, 4]
+    assert memscal.read_scan("scans/a.h5").sensor.name == "13"
+    run(*line, "{row:x}", "--force").exits(1)
+    assert "column 'x' holds" in run(*line, "{row:x}", "--force", "--json").out
 
 
 def test_a_batch_of_tables_is_that_of_their_scans(run, tables):
