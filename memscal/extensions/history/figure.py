@@ -39,15 +39,15 @@ def history_figure(history: History) -> Figure:
     return figure
 
 
-def _calendar(history: History) -> float:
-    """Return the year of the first date, with its fraction."""
-    first = datetime.fromisoformat(history.times[0])
-    return first.year + (first.timetuple().tm_yday - 1) / 365.25
+def _year(time: str) -> float:
+    """Return the year of a time, with its fraction."""
+    moment = datetime.fromisoformat(time)
+    return moment.year + moment.timetuple().tm_yday / 365.25
 
 
 def _draw_dates(axes: Axes, history: History, row: int) -> None:
     errors = coverage() * np.sqrt(np.diag(history.covariances[row]))
-    years = _calendar(history) + history.years
+    years = _year(history.times[0]) + history.years
     look: Values = {"fmt": "o", "color": MEASURED, "ecolor": MUTED, "elinewidth": 0.6, "ms": 4}
     axes.errorbar(years, 100 * history.values[row], 100 * errors, label="calibrations", **look)
     symbol = history.quantities[row].replace("sigma", "σ")
@@ -56,7 +56,6 @@ def _draw_dates(axes: Axes, history: History, row: int) -> None:
 
 def _draw_limits(axes: Axes, history: History, row: int) -> None:
     """Draw where each date is expected by the earlier ones of its segment."""
-    label: str | None = "expected by the earlier dates"
     for i in range(1, history.years.size):
         own = np.flatnonzero(np.array(history.segment[: i + 1]) == history.segment[i])
         values = history.values[row, own]
@@ -65,14 +64,14 @@ def _draw_limits(axes: Axes, history: History, row: int) -> None:
         if newest is not None:
             middle = 100 * (values[-1] - newest.value)
             error = 100 * coverage() * newest.uncertainty
-            x = _calendar(history) + history.years[i] + _WIDTH
+            x = _year(history.times[0]) + history.years[i] + _WIDTH
+            label = "expected by the earlier dates" if i == 1 else None
             draw_band(axes, x, middle - error, middle + error, label)
-            label = None
 
 
 def _draw_segments(axes: Axes, history: History) -> None:
     """Draw a line where a repair or another film begins a segment."""
-    between = _calendar(history) + (history.years[1:] + history.years[:-1]) / 2
+    between = _year(history.times[0]) + (history.years[1:] + history.years[:-1]) / 2
     look: Values = {"linestyles": "dotted", "transform": axes.get_xaxis_transform()}
     kinds = (("repair", history.segment, FAILED), ("another film", history.films, MUTED))
     for what, stated, colour in kinds:
@@ -89,13 +88,9 @@ def _draw_trend(axes: Axes, history: History) -> None:
     years = history.years[own]
     mean = np.mean(history.values[0, own])
     line = 100 * (mean + history.trend["value"] * (years - years.mean()))
-    axes.plot(_calendar(history) + years, line, color=GAUSSIAN, ls="--", label="trend")
+    axes.plot(_year(history.times[0]) + years, line, color=GAUSSIAN, ls="--", label="trend")
     if history.next_date is not None:
-        days = datetime.fromisoformat(history.next_date) - datetime.fromisoformat(
-            history.times[-1][:10]
-        )
-        at = _calendar(history) + history.years[-1] + days.days / 365.25
-        axes.axvline(at, color=GAUSSIAN, ls="-.", label="next calibration")
+        axes.axvline(_year(history.next_date), color=GAUSSIAN, ls="-.", label="next calibration")
 
 
 def report(history: History) -> Report:

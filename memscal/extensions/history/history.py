@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect
 from collections.abc import Iterator, Sequence
 from datetime import UTC, datetime, timedelta
 from os import PathLike
@@ -60,7 +61,7 @@ class History(FrozenArrays, Shown):
     sensor : str
         Serial number or name of the sensor.
     labels : tuple of str
-        Name of each artifact's file, or its number.
+        Name of each artifact's file, or its time.
     times : tuple of str
         When each of n scans began, the earliest first, in ISO 8601.
     years : ndarray, shape (n,)
@@ -137,7 +138,7 @@ class History(FrozenArrays, Shown):
     @property
     def of_one_date(self) -> bool:
         """Whether all scans are of one day: of two methods, rods or laboratories."""
-        return len({time[:10] for time in self.times}) == 1
+        return not self.years.any()
 
 
 def history(
@@ -203,11 +204,12 @@ def history(
     read = sorted(map(_read, apparatuses), key=lambda one: _moment(one.start_time))
     _require_one_sensor(read)
     repaired = sorted(repairs, key=_moment)
+    ends = [*map(_moment, repaired)]
     moments = [_moment(one.start_time) for one in read]
     # Scans of one day are of one time.
     days = np.array([(moment.date() - moments[0].date()).days for moment in moments])
     years = days / _DAYS
-    segment = np.array([sum(_moment(date) <= m for date in repaired) for m in moments])
+    segment = np.array([bisect(ends, moment) for moment in moments])
     names, values, covariances = _quantities(read)
 
     tested = np.flatnonzero(segment == segment[-1])
@@ -226,10 +228,9 @@ def history(
     by_temperature = None
     if temperatures is not None:
         by_temperature = fitted(of_a, ones, temperatures, own[0])
-    numbered = enumerate(read, 1)
     return History(
         sensor=read[0].sensor.serial_number or read[0].sensor.name,
-        labels=tuple(one.source.file_name if one.source else f"{i}" for i, one in numbered),
+        labels=tuple(one.source.file_name if one.source else one.start_time for one in read),
         times=tuple(one.start_time for one in read),
         years=years,
         quantities=names,
@@ -379,9 +380,10 @@ def _messages(read: Sequence[ApparatusFunction]) -> Iterator[Message]:
             "as new. Calibrate their scans again."
         )
         yield Message("history", text)
+    used = {shared.thing_of(source) for source in shared.sources_of(read)}
     for thing, option in shared.THINGS.items():
         unnamed = sum(shared.identity(one, thing) is None for one in read)
-        if unnamed:
+        if unnamed and thing in used:
             what = thing.replace("_", " ")
             text = f"{unnamed} of {len(read)} calibrations do not name the {what} ({option}): it "
             yield Message("history", text + "counts as another one each time.")

@@ -10,6 +10,7 @@ What is not named counts as another thing at each date.
 """
 
 from collections.abc import Hashable, Sequence
+from itertools import chain
 
 import numpy as np
 
@@ -36,11 +37,15 @@ _SOURCES = {
     "stage": "position_scale",
     "sensor": "roundness shear_sensitivity gain_curvature baseline_curvature",
 }
-THING_OF = {source: thing for thing, text in _SOURCES.items() for source in text.split()}
-"""Thing that an uncertainty belongs to, by its source; of others each date has its own."""
 
 #: Sources whose size each scan finds anew, and mostly without a sign.
 _HIDDEN = ("regularisation", "window", "misfit", "baseline_curvature")
+
+
+def thing_of(source: str) -> str:
+    """Return the thing that an uncertainty belongs to, or nothing: each date has its own."""
+    found = (thing for thing, sources in _SOURCES.items() if source in sources.split())
+    return next(found, "")
 
 
 def identity(apparatus: ApparatusData, thing: str) -> Hashable:
@@ -52,11 +57,17 @@ def identity(apparatus: ApparatusData, thing: str) -> Hashable:
         return (which, used.certificate) if which and used.certificate else None
     if thing == "film":
         # What regularisation hides of G depends on the method, too.
-        method = str(apparatus.process.configuration.get("method"))
-        return (used.name, method) if used is not None and used.name else None
+        method = apparatus.process.configuration.get("method", "")
+        return (used.name, method) if used and used.name else None
     if thing == "sensor":
         return thing
     return getattr(used, "name", "") or None
+
+
+def sources_of(apparatuses: Sequence[ApparatusData]) -> list[str]:
+    """Return the sources whose effects some artifact states."""
+    stated = chain.from_iterable(apparatus.shared_effects for apparatus in apparatuses)
+    return list(dict.fromkeys(stated))
 
 
 def common_wavenumbers(apparatuses: Sequence[ApparatusData]) -> FloatArray:
@@ -93,10 +104,9 @@ def covariances(apparatuses: Sequence[ApparatusData], k: FloatArray) -> FloatArr
     size = 2 + k.size
     count = len(apparatuses)
     total = np.zeros((size, size, count, count))
-    sources = {source: None for one in apparatuses for source in one.shared_effects}
-    for source in sources:
+    for source in sources_of(apparatuses):
         effects = np.array([_effects(one, source, k) for one in apparatuses])
-        used = [identity(one, THING_OF.get(source, "")) for one in apparatuses]
+        used = [identity(one, thing_of(source)) for one in apparatuses]
         same = np.eye(count, dtype=bool)
         for i, thing in enumerate(used):
             same[i] |= [thing is not None and thing == other for other in used]

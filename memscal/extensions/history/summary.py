@@ -139,4 +139,4 @@ def _pairs(history: History) -> Iterator[tuple[str, str, str, float]]:
         for k, quantity in enumerate(history.quantities[:2]):
             u = _uncertainty_of_difference(history.covariances[k], i, j)
             difference = history.values[k, j] - history.values[k, i]
-            yield history.labels[i], history.labels[j], quantity, abs(float(difference)) / (2 * u)
+            yield history.labels[i], history.labels[j], quantity, abs(difference) / (2 * u)
