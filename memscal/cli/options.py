@@ -165,7 +165,7 @@ def figure_option(about: str) -> _Adder:
 
 def laboratory_option(subject: str) -> _Adder:
     """Return the option of a laboratory's file."""
-    about = "Laboratory's file (lab.toml): sensor, load cell, stage, operator, temperature, times."
+    about = "Laboratory's file (lab.toml): sensor, film, rod, equipment, operator, conditions."
     return option("--lab", FILE, metavar="lab.toml")(subject + about)
 
 
