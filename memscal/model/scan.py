@@ -195,6 +195,7 @@ class ArrayOptions(TypedDict, total=False):
     baseline_curvature_uncertainty: float
     shear_sensitivity_uncertainty: float
     u_zz_correlation: FloatArray
+    motion: str
     averaging_length: float
     dwell_time: float
 
