@@ -132,7 +132,7 @@ def _weighed(solution: Solution, departure: float) -> list[Values]:
     found.sort(reverse=True)
     least = max(found[0][0] - VERY_STRONG / 2, POSITIVE / 2)
     keys = ("log_bayes_factor", "name", "words", "relative_change_of_a")
-    return [dict(zip(keys, row, strict=True)) | {"named": row[0] >= least} for row in found]
+    return [dict(zip(keys, row, strict=True)) | {"named": bool(row[0] >= least)} for row in found]
 
 
 def _applicable(solution: Solution) -> list[str]:

@@ -42,6 +42,7 @@ _LAYOUTS: dict[str, dict[str, Record]] = {
         "/entry/data": record(
             "NXdata", *records.SCAN_DATA.quantities, *records.TAKEN_FOR_GRANTED.quantities
         ),
+        "/entry/noise_record": records.SCAN_DATA,
         "/entry/reference": records.REFERENCE_DATA,
         **_MEASURED_ON,
         "/entry/synthetic": records.SYNTHETIC,

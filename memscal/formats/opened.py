@@ -76,6 +76,12 @@ def opened_contacts(
             opened.append(read if is_stress else opened_scan(read, noise_record=noise_record))
         else:
             opened.append(opened_scan(item, noise_record=noise_record))
+    if noise_record is not None and not all(isinstance(item, Scan) for item in opened):
+        raise InputError(
+            "A noise record and measured stress are given.",
+            why="Measured stress has the noise with which it was measured.",
+            cure="Give the scans, or measure the stress with the record (memscal apply).",
+        )
     require_different(contents_of(item) for item in opened if isinstance(item, Scan))
     return tuple(opened)
 

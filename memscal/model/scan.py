@@ -399,6 +399,8 @@ class Scan:
         shape = " x ".join(map(str, self.u_zz.shape))
         form = shape if self.kind == "points" else f"{self.kind}, {shape}"
         reach = f"{self.x.min() * 1e3:.4g} to {self.x.max() * 1e3:.4g} mm"
+        if self.motion == "rest":
+            return f"<{type(self).__name__}: noise record, {shape} readings>"
         load = "no load stated" if self.load is None else f"load {self.load:.4g} N"
         return f"<{type(self).__name__}: {form} points, x from {reach}, {load}>"
 
@@ -597,6 +599,12 @@ class Scan:
             )
         require_non_negative("averaging length of the scan", self.averaging_length)
         require_non_negative("dwell time of the scan", self.dwell_time)
+        record = self.noise_record
+        if record is not None and not (isinstance(record, Scan) and record.motion == "rest"):
+            raise InputError(
+                f"The noise record of the scan is {record!r}.",
+                cure="Give readings at rest, as read_scan() returns them (motion='rest').",
+            )
         require_rod_friction(self.rod_friction)
         require_non_negative("standard uncertainty of the load", self.load_uncertainty)
         if self.normal_load_errors is not None and self.normal_load is None:

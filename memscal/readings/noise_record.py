@@ -16,7 +16,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from memscal.errors import FitError, InputError
+from memscal.errors import FitError, InputError, counted
 from memscal.model.arrays import FloatArray, IndexArray, array_record
 from memscal.model.checks import Message
 from memscal.model.notation import Reading
@@ -104,11 +104,12 @@ def noise_of(record: Scan) -> NoiseRecord:
     step = float(np.median(np.diff(time))) if time.size >= _FEWEST else 0.0
     if step <= 0 or np.abs(np.diff(time) - step).max() > _UNEVEN * step:
         raise InputError(
-            f"The {time.size} readings of {name} do not follow each other in even steps of time.",
+            f"The {time.size} readings of {name} that are not missing are fewer than {_FEWEST}, or "
+            "do not follow each other in even steps of time.",
             why="Their spectral density tells how the noise of readings is correlated.",
             cure=f"Give at least {_FEWEST} readings at one rate, without gaps.",
         )
-    if not u.std():
+    if not np.ptp(u):
         raise FitError(f"All readings of {name} are equal.", cure="Record more digits.")
     duration = time.size * step
     count = int(_PER_DECADE * np.log10(_LONGEST * duration / step)) + 1
@@ -186,6 +187,17 @@ def with_recorded_noise(scan: Scan) -> Scan:
             why="A noise record tells the correlation of readings by the time between them.",
             cure="Import it with its times (memscal import --time), or state the noise (--noise).",
         )
+    untimed = np.isfinite(scan.u_zz) & ~np.isfinite(scan.time)
+    passes = scan.time.reshape(1 if scan.planar else -1, -1 if scan.planar else scan.x.size)
+    repeated = [np.unique(row[np.isfinite(row)], return_counts=True)[1] for row in passes]
+    again = int(np.sum(np.concatenate(repeated) - 1))
+    if untimed.any() or again:
+        raise InputError(
+            f"{name} states no time of {counted(untimed.sum(), 'readings')}, and of {again} that "
+            "of another of the same pass (/entry/data/time).",
+            why="A noise record tells the correlation of readings by the time between them.",
+            cure="Give the time of each reading, or state the noise (--noise).",
+        )
     if record.unit != scan.unit:
         raise InputError(
             f"The readings of {name} are in {scan.unit}, those of its noise record in "
@@ -193,12 +205,13 @@ def with_recorded_noise(scan: Scan) -> Scan:
             cure="Give a record of the same sensor, in the same unit.",
         )
     noise = noise_of(record)
-    passes = scan.time.reshape(1 if scan.planar else -1, -1 if scan.planar else scan.x.size)
     lags = np.mean([np.abs(np.subtract.outer(times, times)) for times in passes], axis=0)
     samples = 1
     if scan.averaging_length is not None:
-        pace = np.nanmedian(np.abs(np.diff(passes[0][: scan.x.size]) / np.diff(scan.x)))
-        samples = max(round(float(pace * scan.averaging_length / noise.step)), 1)
+        first = passes[0][: scan.x.size]
+        lasts = np.nanmax(first) - np.nanmin(first)
+        share = scan.averaging_length / np.abs(np.diff(scan.x)).sum()
+        samples = max(round(float(share * lasts / noise.step)), 1)
     covariance = np.nan_to_num(noise.covariance(lags, samples))
     variance = float(noise.covariance(np.zeros(1), samples)[0])
     correlation = covariance / variance
@@ -207,5 +220,5 @@ def with_recorded_noise(scan: Scan) -> Scan:
     return replace(
         scan,
         u_zz_errors=np.full(scan.u_zz.shape, np.sqrt(variance)),
-        u_zz_correlation=correlation if alike else None,
+        u_zz_correlation=correlation if alike else np.ones((len(correlation), 1)),
     )

@@ -33,6 +33,7 @@ def planar_points(x, y, channel):
         branch=np.zeros(n, np.int64),
         scan=np.zeros(n, np.intp),
         free=np.array([[True, True]]),
+        averaging=np.zeros((1, 2)),
         missing=0,
         channel=channel,
     )

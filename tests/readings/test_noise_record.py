@@ -103,14 +103,24 @@ def test_the_noise_of_a_record_takes_the_place_of_what_is_stated():
     assert again.budget == noisy.budget
 
 
+def timed(times):
+    """Calibrate a scan of such times with a record."""
+    return memscal.calibrate(replace(simulated(seed=1), time=times), noise_record=record(U))
+
+
 @pytest.mark.parametrize(
     ("made", "words"),
     [
         (lambda: noise_of(simulated(seed=1)), "is no noise record"),
-        (lambda: noise_of(record(np.zeros(300))), "are equal"),
+        (lambda: noise_of(record(np.full(300, 1e-3))), "are equal"),
         (lambda: noise_of(record(np.arange(20.0))), "even steps"),
         (lambda: noise_of(record(np.r_[U, np.full(50, np.nan), U])), "even steps"),
         (lambda: memscal.calibrate(record(U)), "noise record: nothing was pressed"),
+        (lambda: timed(np.r_[np.nan, 1:65]), "no time of 1 reading,"),
+        (lambda: timed(np.full(65, np.nan)), "no time of 65 readings"),
+        (lambda: timed(np.r_[0:64, 63]), "of 1 that of another"),
+        (lambda: replace(simulated(seed=1), noise_record="n.h5"), "noise record of the scan"),
+        (lambda: replace(simulated(seed=1), noise_record=simulated(seed=1)), "noise record of the"),
         (
             lambda: memscal.calibrate(simulated(seed=1), noise_record=record(U)),
             "time",
@@ -138,16 +148,19 @@ def test_a_record_is_imported_and_used_on_the_command_line(run, artifact, scan):
     assert "mV (rms) at 50 readings a second" in done.out
     assert "Not stated" not in done.out
     run("import", "rest.csv", "--u", "U", "--noise-record", "-o", "b.h5").exits(3, "in time")
+    run(*stated.split(), "--force", "--speed", "2").exits(3, "in time, at rest")
     run("calibrate", "noise.h5").exits(3, "noise record")
     run("restore", str(artifact), "noise.h5").exits(3)
     run("inspect", "noise.h5").exits(0)
     timed = replace(memscal.read_scan(scan), time=np.arange(65.0))
     memscal.write_scan(timed, "timed.h5")
-    for command in (["calibrate"], ["apply", "a.h5"], ["restore", "a.h5"]):
+    for command in (["calibrate"], ["restore", "a.h5"], ["apply", "a.h5"]):
         written = ["-o", "a.h5" if command == ["calibrate"] else "out.h5"]
         done = run(
             *command, "timed.h5", "--noise-record", "noise.h5", "--json", "--force", *written
         )
         assert done.code in (0, 1), done.err
         assert "noise are those of noise.h5" in done.out
+    given = ["compare", "a.h5", "out.h5", "--noise-record", "noise.h5"]
+    assert "measured stress" in run(*given).err
     run("restore", str(artifact), str(scan), "--noise-record", "noise.h5").exits(3, "--time")

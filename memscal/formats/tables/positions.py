@@ -15,7 +15,12 @@ from memscal.model.scan import LINE
 def require_positions(named: Mapping[str, Any], layout: TableLayout, *, resting: bool) -> None:
     """Refuse a table without positions, or with two kinds of them."""
     columns = named["x"] is not None or named["y"] is not None
-    if layout.speed is not None:
+    if resting:
+        others = columns or layout.step is not None or layout.speed is not None
+        if others or layout.holds or named["time"] is None:
+            cure = "Name the columns of time and readings alone (--time, --u)."
+            raise InputError("A noise record is readings in time, at rest.", cure=cure)
+    elif layout.speed is not None:
         others = columns or layout.step is not None or layout.holds or "repeat 0" in named
         if others or named["time"] is None or not 0 < abs(layout.speed) < np.inf:
             raise InputError(
@@ -31,10 +36,6 @@ def require_positions(named: Mapping[str, Any], layout: TableLayout, *, resting:
                 cure="Name the column that counts them (--x COLUMN) or, of a log with holds "
                 "(--holds), that of the load (--load-column) or depth (--depth) of each press.",
             )
-    elif resting:
-        if columns or named["time"] is None:
-            cure = "Name the columns of time and readings alone (--time, --u)."
-            raise InputError("A noise record is readings in time, at rest.", cure=cure)
     elif not columns:
         cure = "Give x (--x COLUMN), or times (--time COLUMN) and the stage's speed (--speed)."
         raise InputError("No column of the positions is named.", cure=cure)
