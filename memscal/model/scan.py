@@ -600,7 +600,7 @@ class Scan:
         require_non_negative("averaging length of the scan", self.averaging_length)
         require_non_negative("dwell time of the scan", self.dwell_time)
         record = self.noise_record
-        if record is not None and not (isinstance(record, Scan) and record.motion == "rest"):
+        if record is not None and getattr(record, "motion", "") != "rest":
             raise InputError(
                 f"The noise record of the scan is {record!r}.",
                 cure="Give readings at rest, as read_scan() returns them (motion='rest').",
