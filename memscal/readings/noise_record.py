@@ -56,6 +56,11 @@ class NoiseRecord:
         return np.asarray(2 * self.step * self.white + slow)
 
     @property
+    def band(self) -> tuple[float, float]:
+        """Lowest and highest frequency of the record in Hz: one period, and half the rate."""
+        return 1 / self.duration, 0.5 / self.step
+
+    @property
     def corner(self) -> float:
         """Highest frequency, in Hz, at which drift is more than all other noise; 0 for none."""
         frequency = np.geomspace(0.1 / self.duration, 0.5 / self.step, _BINS)

@@ -10,6 +10,7 @@ import numpy as np
 
 from memscal.calibration.calibrate import Calibration, calibrate
 from memscal.errors import InputError, require_names
+from memscal.extensions.acquisition.positions import require_whole
 from memscal.extensions.planning.design import require_targets
 from memscal.formats.units import reading_of, to_si
 from memscal.model.arrays import Values
@@ -30,7 +31,8 @@ class LiveScan:
     ----------
     x, u : str
         Keys of position and reading in the data of the events: of the stage its readback, not its
-        setpoint.  Only streams whose descriptor has both count.
+        setpoint.  Only streams whose descriptor has both count, and never the stream ``baseline``:
+        what Bluesky reads before and after a run, with the rod lifted, is no reading of the scan.
     x_unit, u_unit : str
         Their units, which documents do not state.
     every : int
@@ -51,7 +53,8 @@ class LiveScan:
     Raises
     ------
     InputError
-        Before the run: if a unit cannot be read, or a scan has no such field.
+        Before the run: if a unit cannot be read, ``every`` is no whole number of at least zero, or
+        a scan has no such field.
 
     Examples
     --------
@@ -80,6 +83,7 @@ class LiveScan:
         to_si(0.0, x_unit, "length", "x of the run (x_unit)")
         reading_of(u_unit, "u of the run (u_unit)")
         require_names("A scan has no field", stated, Scan.__dataclass_fields__)
+        require_whole("The number of readings after which is calibrated (every)", every)
         self.keys = (x, u)
         self.units: Values = {"x_unit": x_unit, "u_unit": u_unit}
         self.every = every
@@ -89,6 +93,7 @@ class LiveScan:
         self._function = calibrate
         self._rows: list[tuple[float, ...]] = []
         self._streams = set[str]()
+        self._found = set[str]()
         self._run: str | None = None
 
     def __call__(self, name: str, document: Mapping[str, Any]) -> None:
@@ -106,7 +111,7 @@ class LiveScan:
         try:
             self._add(x, u, load, time)
         except Exception as failure:  # noqa: BLE001 - see above
-            self._note(f"The reading {u!r} at {x!r} is left out: {failure!r}.")
+            self._note(f"The reading {u!r} at {x!r} is left out: {failure}.")
 
     def scan(self) -> Scan:
         """Return what was read so far as a scan.
@@ -117,9 +122,11 @@ class LiveScan:
             If nothing was read, or the readings and what is stated make no scan.
         """
         if not self._rows:
+            if self._found:
+                require_names("No stream of the run has", self.keys, sorted(self._found))
             raise InputError(
                 f"No reading of {' and '.join(self.keys)} has arrived.",
-                why="Only events of a stream that has both keys are readings.",
+                why="Only events of a stream that has both keys, and is not the baseline, count.",
                 cure="Compare the keys with those of the run's descriptor.",
             )
         x, u, load, time = np.array(self._rows).T
@@ -150,9 +157,13 @@ class LiveScan:
 
         Raises
         ------
-        ArgumentError
-            If there is no such target.
+        InputError
+            If there is no target, or no such one.
         """
+        if not targets:
+            raise InputError(
+                "No target is given that the result is to reach.", cure="Give one, such as A=0.015."
+            )
         wanted = require_targets(targets, "repeats")
         if self.result is None:
             return False
@@ -169,7 +180,20 @@ class LiveScan:
         return True
 
     def _take(self, name: str, document: Mapping[str, Any]) -> None:
-        if name == "descriptor" and {*self.keys} <= document["data_keys"].keys():
+        if name == "descriptor":
+            self._describe(document)
+        elif name in ("event", "event_page") and document["descriptor"] in self._streams:
+            for x, u, time in self._readings(name, document):
+                if x is not None and u is not None:
+                    self.add(x, u, time=time)
+        elif name == "stop" and self._run in (None, document.get("run_start", self._run)):
+            self._try()
+
+    def _describe(self, document: Mapping[str, Any]) -> None:
+        """Count the stream of a descriptor if it has both keys; forget the run before."""
+        keys = document["data_keys"].keys()
+        self._found.update(keys)
+        if {*self.keys} <= keys and document.get("name") != "baseline":
             run = document.get("run_start")
             if run != self._run:
                 self._rows.clear()
@@ -177,11 +201,6 @@ class LiveScan:
                 self.result = None
             self._run = run
             self._streams.add(document["uid"])
-        elif name in ("event", "event_page") and document["descriptor"] in self._streams:
-            for x, u, time in self._readings(name, document):
-                self.add(x, u, time=time)
-        elif name == "stop" and self._streams and document.get("run_start", self._run) == self._run:
-            self._try()
 
     def _readings(self, name: str, document: Mapping[str, Any]) -> Iterable[Any]:
         """Return position, reading and time of each event; None where it has none."""
@@ -195,7 +214,7 @@ class LiveScan:
     def _add(self, x: Any, u: Any, load: Any, time: Any) -> None:
         numbers = [np.nan if number is None else float(number) for number in (x, u, load, time)]
         if not np.isfinite(numbers[:2]).all():
-            return
+            raise InputError("position and reading must be finite numbers")
         self._rows.append(tuple(numbers))
         if self.every and len(self._rows) % self.every == 0:
             self._try()

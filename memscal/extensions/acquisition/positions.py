@@ -1,5 +1,8 @@
 """Positions of a planned scan in an order that can be stopped early."""
 
+from numbers import Integral
+from typing import Any
+
 import numpy as np
 
 from memscal.errors import InputError, require_names
@@ -11,6 +14,12 @@ _BLOCKS = {
     "interleaved": (slice(0, None, 4), slice(2, None, 4), slice(1, None, 2)),
     "along": (slice(None),),
 }
+
+
+def require_whole(name: str, value: Any) -> None:
+    """Refuse what is no whole number of at least zero."""
+    if not isinstance(value, Integral) or int(value) < 0:
+        raise InputError(f"{name} is {value!r}.", cure="Give a whole number, 0 or more.")
 
 
 def positions(design: Design, order: str = "interleaved", blanks: int = 5) -> FloatArray:
@@ -51,10 +60,7 @@ def positions(design: Design, order: str = "interleaved", blanks: int = 5) -> Fl
     [-4.0, 0.0, 4.0, 5.0, -2.0, 2.0, 5.0, -3.0, -1.0, 1.0, 3.0]
     """
     require_names("There is no order", [order], _BLOCKS)
-    if blanks != int(blanks) or blanks < 0:
-        raise InputError(
-            f"The number of blanks is {blanks}.", cure="Give how many places are read, 0 or more."
-        )
+    require_whole("The number of blanks", blanks)
     plan = design.plan
     line = plan.scan().x
     beyond = line[-1] + plan.step * np.arange(1, blanks + 1)

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
@@ -20,7 +21,7 @@ from memscal.figures.style import (
     panels_of,
 )
 from memscal.model.arrays import FloatArray
-from memscal.model.quantities import KPA, MM, Quantity
+from memscal.model.quantities import MM, Quantity
 
 _FINE = 121
 #: Waves are drawn from this share of the shortest resolved one, speeds by this factor around.
@@ -37,10 +38,12 @@ def response_figure(seen: Response) -> Figure:
     limit = 2 * math.pi / seen.apparatus.resolved_wavenumber
     longest = max(_LONGEST * seen.film.thickness, *seen.wavelength)
     shortest = min(_SHORTEST * limit, *seen.wavelength)
-    # Where not even the length is resolved, there is no smallest stress to draw.
-    length = seen.length or 0.0
-    heard = length > limit
-    wavelength = np.geomspace(shortest, length if heard else longest, _FINE)
+    # Where no wave has a smallest stress, there is none to draw.
+    heard = bool(np.isfinite(seen.smallest_stress).any())
+    if heard:
+        assert seen.length is not None  # it is given with a noise record
+        longest = seen.length
+    wavelength = np.geomspace(shortest, longest, _FINE)
     with panels_of(3.4, 1, 1 + heard, squeeze=False) as (figure, [panels]):
         _draw_gain(panels[0], seen, wavelength)
         if heard:
@@ -75,24 +78,24 @@ def _draw_smallest(axes: Axes, seen: Response, wavelength: FloatArray) -> None:
     assert noise is not None
     speed = np.geomspace(seen.speed.min() / _AROUND, seen.speed.max() * _AROUND, _FINE)
     smallest = _at(seen, wavelength, speed).smallest_stress
-    levels = 10 ** (np.floor(np.log10(np.nanmin(smallest))) + np.arange(_DECADES))
-    lines = axes.contour(wavelength / MM, speed / MM, smallest, levels, colors=DECONVOLVED)
-    # Set into the line, a label on axes of logarithms would cut out much of it.
-    for label in axes.clabel(lines, fmt=_in_pascals, fontsize=7, inline=False):
-        label.set_bbox({"color": "white", "pad": 0.5})
+    least = np.floor(np.log10(np.nanmin(smallest)))
+    levels = 10 ** (least + np.arange(_DECADES))
+    # Next to the shortest resolved wave the contours are too close for labels of their own.
+    areas = axes.contourf(
+        wavelength / MM, speed / MM, smallest, levels, norm=LogNorm(), cmap="Blues", extend="max"
+    )
+    axes.figure.colorbar(areas, ax=axes, label=f"smallest stress, {SIGMAS:g} sigma (Pa)")
     if noise.corner:
         corner = noise.corner * wavelength / MM
         axes.plot(wavelength / MM, corner, color=FAILED, ls="--", label="drift rules below")
-        axes.fill_between(wavelength / MM, corner, color=MUTED, alpha=0.15, lw=0)
-    axes.plot([], [], color=DECONVOLVED, label=f"smallest stress, {SIGMAS:g} sigma")
+    if np.isfinite(seen.noise_band[1]):
+        edges = np.outer(wavelength / MM, seen.noise_band)
+        lines = axes.plot(wavelength / MM, edges, color=MUTED, ls="-.")
+        lines[0].set_label("noise known between")
     places = np.meshgrid(seen.wavelength / MM, seen.speed / MM)
     axes.plot(*map(np.ravel, places), "o", color=MEASURED, ms=3)
     axes.set(yscale="log", ylim=speed[[0, -1]] / MM, ylabel="speed (mm/s)")
     axes.yaxis.set_major_formatter("{x:g}")
-
-
-def _in_pascals(level: float) -> str:
-    return f"{level:g} Pa" if level < KPA else f"{level / KPA:g} kPa"
 
 
 def _at(seen: Response, wavelength: FloatArray, speed: FloatArray | None = None) -> Response:

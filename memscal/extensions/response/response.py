@@ -49,7 +49,10 @@ ComplexArray = NDArray[np.complex128]
 
 @runtime_checkable
 class NoiseSpectrum(Protocol):
-    """What is known of the noise of a sensor at rest."""
+    """What is known of the noise of a sensor at rest.
+
+    It may have ``band``, lowest and highest frequency in Hz at which its density holds.
+    """
 
     @property
     def corner(self) -> float:
@@ -127,14 +130,27 @@ class Response(Shown):
 
         :math:`3\sqrt{S_n(V/\lambda)\,V/l}\,/\,|g|`: three standard uncertainties of the amplitude
         of a wave of known length that is fitted over the length :math:`l`, in noise of the
-        one-sided spectral density :math:`S_n`.  NaN where that, or the gain, is not known.
+        one-sided spectral density :math:`S_n`.  NaN where that, or the gain, is not known: outside
+        ``noise_band``, too.
         """
         frequency = self.frequency
         if self.noise_record is None or self.length is None:
             return np.full_like(frequency, np.nan)
         density = self.noise_record.spectral_density(frequency)
         bandwidth = frequency * self.wavelength / self.length
-        return SIGMAS * np.sqrt(density * bandwidth) / np.abs(self.gain)
+        smallest = SIGMAS * np.sqrt(density * bandwidth) / np.abs(self.gain)
+        low, high = self.noise_band
+        return np.where((low <= frequency) & (frequency <= high), smallest, np.nan)
+
+    @property
+    def noise_band(self) -> tuple[float, float]:
+        """Frequencies in Hz between which the noise is known.
+
+        Of a record: one over its duration, and half the rate of its readings; of an object its
+        ``band``, or all frequencies.
+        """
+        low, high = getattr(self.noise_record, "band", (0.0, np.inf))
+        return low, high
 
     @property
     def waves(self) -> Iterator[Wave]:
@@ -183,7 +199,9 @@ def response(
     noise_record : path, Scan or object, optional
         The noise at rest: a record, its file, or what has ``spectral_density(frequency)``,
         one-sided, in V^2/Hz, and ``corner``, the frequency in Hz below which drift rules.  Give
-        ``speed`` and ``length`` with it.
+        ``speed`` and ``length`` with it.  The density of a record is not extrapolated: there is no
+        smallest stress at frequencies below one over its duration or above half its rate, nor
+        outside the ``band``, (lowest, highest) in Hz, of an object that has one.
     length : float, optional
         Length over which a wave is observed, in m.
 

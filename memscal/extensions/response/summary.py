@@ -46,20 +46,27 @@ def answer(seen: Response) -> str:
     noise = seen.noise_record
     if noise is not None and np.any(seen.frequency < noise.corner):
         lines.append(f"Below {noise.corner:.3g} Hz drift rules the noise: move faster.")
+    low, high = seen.noise_band
+    if np.any((seen.frequency < low) | (seen.frequency > high)):
+        lines.append(
+            f"The noise is known from {low:.3g} to {high:.3g} Hz: outside, no stress is given."
+        )
     return "\n".join(lines)
 
 
 def tables(seen: Response) -> list[Table]:
     """Return one row for each wave, with what is known of it."""
-    head = ["wavelength (mm)", "gain", "phase (rad)"]
     timed = seen.speed is not None
     heard = seen.noise_record is not None
+    head = ["wavelength (mm)"] + ["speed (mm/s)"] * timed + ["gain", "phase (rad)"]
     head += ["frequency (Hz)"] * timed + ["smallest stress (Pa)"] * heard
     rows = []
     for wave in seen.waves:
-        row = [f"{wave.wavelength / MM:.4g}", *_gain_cells(seen, wave)]
+        row = [f"{wave.wavelength / MM:.4g}"]
+        row += [f"{wave.frequency * wave.wavelength / MM:.4g}"] * timed
+        row += _gain_cells(seen, wave)
         row += [f"{wave.frequency:.4g}"] * timed
-        row += [f"{wave.smallest_stress:.3g}" if wave.resolved else "-"] * heard
+        row += ["-" if math.isnan(wave.smallest_stress) else f"{wave.smallest_stress:.3g}"] * heard
         rows.append(row)
     title = "Reading per pressure of a wave (± standard uncertainty, k = 1)"
     if seen.friction:

@@ -31,8 +31,8 @@ def test_the_documents_of_a_run_make_the_scan_and_its_calibration():
     for x, u in ROWS[:25]:
         live("event", event(x, u))
         live("event", event(x, u, descriptor="d2"))
-    for lacking in (None, np.nan):
-        live("event", event(0.0, lacking))
+    live("event", event(0.0, None))
+    assert live.error == ""
     live("event_page", event(*zip(*ROWS[25:], strict=True)))
     live("stop", {"run_start": "r1"})
     scan = live.scan()
@@ -48,6 +48,40 @@ def test_the_documents_of_a_run_make_the_scan_and_its_calibration():
     assert live.result is None
     with pytest.raises(memscal.MemscalError, match="No reading of stage and sensor"):
         live.scan()
+
+
+def test_a_misspelt_key_is_named_at_the_end_with_the_keys_there_are():
+    live = LiveScan("stge", "sensor", x_unit="mm", u_unit="mV", **STATED)
+    live("descriptor", RUN)
+    live("event", event(1.0, 2.0))
+    live("stop", {"run_start": "r1"})
+    assert live.result is None
+    assert "No stream of the run has stge." in live.error
+    assert "Did you mean stage? Choose from other, sensor, stage." in live.error
+
+
+def test_a_lifted_rod_read_before_and_after_the_run_is_no_reading():
+    live = LiveScan("stage", "sensor", x_unit="mm", u_unit="mV", **STATED)
+    live("descriptor", RUN | {"uid": "d0", "name": "baseline"})
+    live("event", event(-9.0, 0.0, descriptor="d0"))
+    live("descriptor", RUN | {"name": "primary"})
+    live("event", event(1.0, 2.0))
+    live("event", event(9.0, 0.0, descriptor="d0"))
+    assert live.scan().x.tolist() == [1e-3]
+
+
+@pytest.mark.parametrize("reading", [(np.nan, 1.0), (1.0, np.inf), (None, 1.0), ("a", 1.0)])
+def test_what_is_added_and_no_number_is_left_out_and_said(reading):
+    live = live_scan()
+    live.add(1.0, 2.0)
+    live.add(*reading)
+    assert f"The reading {reading[1]!r} at {reading[0]!r} is left out" in live.error
+    assert live.scan().x.size == 1
+
+
+def test_without_a_target_nothing_is_reached():
+    with pytest.raises(memscal.MemscalError, match="No target is given"):
+        live_scan().reached()
 
 
 @pytest.mark.parametrize("document", [None, {"descriptor": "d1"}, event(0.0, "volts")])
@@ -84,7 +118,11 @@ def test_half_a_scan_from_left_to_right_is_no_result_and_half_an_interleaved_one
     assert interleaved.result is not None
 
 
-@pytest.mark.parametrize("wrong", [{"x_unit": "V"}, {"u_unit": "furlong^"}, {"lod": 1.0}])
+WRONG = [{"x_unit": "V"}, {"u_unit": "furlong^"}, {"lod": 1.0}]
+WRONG += [{"every": -1}, {"every": 2.5}, {"every": "a"}]
+
+
+@pytest.mark.parametrize("wrong", WRONG)
 def test_what_is_misspelt_is_refused_before_the_run(wrong):
     with pytest.raises(memscal.MemscalError):
         LiveScan("stage", "sensor", **({"x_unit": "mm", "u_unit": "mV"} | wrong))
@@ -95,5 +133,6 @@ def test_the_order_refines_the_field_block_by_block_and_reads_blanks_between():
     block = [[-4, 0, 4], [5, 6], [-2, 2], [5, 6], [-3, -1, 1, 3]]
     expected = 1e-3 * np.concatenate([*block, [5, 6], *block])
     np.testing.assert_allclose(positions(planned, blanks=2), expected, atol=1e-12)
-    with pytest.raises(memscal.MemscalError, match="The number of blanks"):
-        positions(planned, blanks=0.5)
+    for wrong in (0.5, -1, "a"):
+        with pytest.raises(memscal.MemscalError, match="The number of blanks"):
+            positions(planned, blanks=wrong)

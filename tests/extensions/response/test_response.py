@@ -72,6 +72,33 @@ def test_speeds_make_rows_and_are_drawn_with_the_corner_of_the_drift():
     np.testing.assert_allclose(corner.get_ydata(), 0.3 * corner.get_xdata())
 
 
+def test_a_record_tells_no_stress_slower_than_itself_or_faster_than_half_its_rate():
+    rest = np.random.default_rng(1).normal(size=6000)  # 120 s at 50 Hz
+    record = memscal.Scan(x=0 * rest, u_zz=rest, time=0.02 * np.arange(6000), motion="rest")
+    frequencies = np.array([0.99 / 120, 1.01 / 120, 24.9, 25.1])
+    seen = memscal.response(SENSOR, 4e-3, 4e-3 * frequencies, noise_record=record, length=50e-3)
+    assert np.isfinite(seen.smallest_stress[:, 0]).tolist() == [False, True, True, False]
+    stresses = [wave["smallest_stress"]["value"] for wave in seen.to_dict()["waves"]]
+    assert [stress is None for stress in stresses] == [True, False, False, True]
+    assert "known from 0.00833 to 25 Hz" in seen.answer()
+    [rows] = [table.rows for table in seen.tables()]
+    assert [(row[1], row[-1] == "-") for row in rows][2:] == [("99.6", False), ("100.4", True)]
+    _, panel, bar = seen.plot().axes
+    assert "noise known between" in panel.get_legend_handles_labels()[1]
+    assert "smallest stress, 3 sigma (Pa)" in bar.get_ylabel()
+    aside = memscal.response(SENSOR, 4e-3, 1.0, noise_record=record, length=50e-3)
+    assert len(aside.plot().axes) == 1
+
+
+def test_an_object_that_states_a_band_is_known_within_it_and_another_everywhere():
+    banded = SimpleNamespace(**vars(WHITE), band=(0.2, 1.0))
+    stresses = [
+        memscal.response(SENSOR, 4e-3, 5e-3, noise_record=noise, length=50e-3).smallest_stress
+        for noise in (WHITE, banded)
+    ]
+    assert np.isfinite(stresses).ravel().tolist() == [True, False]
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
