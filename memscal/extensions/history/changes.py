@@ -158,7 +158,7 @@ def change_tests(
     drawn = _steps(np.linalg.cholesky(total) @ normal, base, covariance)
     most = np.max([step.statistic for step in drawn.values()], axis=0)
     above = 1 + np.count_nonzero(most >= statistic)
-    factor = float(np.quantile(most, 1 - level)) + ndtri(POWER)
+    factor = np.quantile(most, 1 - level) + ndtri(POWER)
     chi_square = float(_least_squares(base, total, values).chi_square)
     freedom = len(values) - base.shape[1]
     degrees = (freedom, largest.degrees[0])
@@ -169,7 +169,7 @@ def change_tests(
         "change_point": {
             "statistic": statistic,
             "p": float(above / (_DRAWS + 1)),
-            "seen": factor * least,
+            "seen": float(factor * least),
             "between": names[i - 1 : i + 1],
             **largest.stated("1"),
         },
