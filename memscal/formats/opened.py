@@ -105,7 +105,7 @@ def require_different(named: Iterable[tuple[str, Hashable]]) -> None:
                 f"{name} is given twice.",
                 why="The same readings would count as independent ones, and every uncertainty "
                 "would come out too small.",
-                cure="Give each scan once, itself or as measured stress.",
+                cure="Give each of them once.",
             )
         seen.add(content)
 

@@ -51,8 +51,8 @@ def finite(value: float | None) -> float | None:
 
 
 def percent(share: float) -> str:
-    """Return a share in percent, with the space of ISO 80000: ``95 %``."""
-    return f"{100 * share:.3g} %"
+    """Return a share in percent, with the space of ISO 80000: ``95 %``, ``1000 %``."""
+    return f"{float(f'{100 * share:.3g}'):g} %"
 
 
 def stated_text(value: object) -> str:

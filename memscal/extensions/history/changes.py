@@ -36,6 +36,8 @@ _SCATTERS = np.append(0.0, np.geomspace(0.3, 30.0, 14))
 _DRAWS = 1000
 #: Scatter that counts as none, over a date's own errors.
 _NEGLIGIBLE = 1e-3
+#: Time in years below which a calibration is due now.
+_DAY = 1 / 365.25
 
 
 @array_record
@@ -52,15 +54,24 @@ class Fitted:
         """Absolute values over standard uncertainties."""
         return np.abs(self.value) / self.uncertainty
 
-    @property
-    def p_value(self) -> float:
-        """Chance of such a coefficient of the first history, or a larger one."""
-        return float(2 * stdtr(self.degrees[0], -self.statistic[0]))
+    def stated(self, unit: str) -> Values:
+        """Return the coefficient of the first history as JSON holds it."""
+        return {
+            "value": float(self.value[0]),
+            "standard_uncertainty": float(self.uncertainty[0]),
+            "unit": unit,
+        }
 
-    def detectable(self, level: float) -> float:
-        """Size of which a test at a level would have seen 95 %."""
-        factor = ndtri(POWER) - stdtrit(self.degrees[0], level / 2)
-        return float(factor * self.uncertainty[0])
+    def test(self, level: float) -> Values:
+        """Return the test of the first history, and the size of which it would have seen 95 %."""
+        statistic = float(self.statistic[0])
+        degrees = self.degrees[0]
+        factor = ndtri(POWER) - stdtrit(degrees, level / 2)
+        return {
+            "statistic": statistic,
+            "p": float(2 * stdtr(degrees, -statistic)),
+            "seen": float(factor * self.uncertainty[0]),
+        }
 
 
 class _Likely(NamedTuple):
@@ -87,13 +98,15 @@ def fitted(
     values: FloatArray, base: FloatArray, column: FloatArray, covariance: FloatArray
 ) -> Fitted | None:
     """Fit a column beside those of the base to histories (n, m); none where it tells nothing."""
+    values = np.atleast_2d(values.T).T
     columns = np.column_stack([base, column])
-    freedom = len(columns) - columns.shape[1]
-    if np.linalg.matrix_rank(columns) < columns.shape[1]:
+    count, parameters = columns.shape
+    freedom = count - parameters
+    if np.linalg.matrix_rank(columns) < parameters:
         return None
     own = own_variance(columns, covariance)
     scatters = np.sqrt(own) * _SCATTERS[: None if freedom > 0 else 1]
-    unit = np.eye(len(columns))
+    unit = np.eye(count)
     fits = [_least_squares(columns, covariance + s**2 * unit, values) for s in scatters]
     best = np.argmax([fit.likelihood for fit in fits], axis=0)
     scatter = scatters[best]
@@ -116,83 +129,63 @@ def own_variance(columns: FloatArray, covariance: FloatArray) -> float:
 
 
 def change_tests(
-    values: FloatArray, base: FloatArray, covariance: FloatArray, years: FloatArray, level: float
-) -> dict[str, Values]:
-    """Return the tests of one history (n,) that tell something, by their names.
-
-    Each has ``statistic``, ``p`` and ``seen``, the size of a step (or a change per year) of which
-    a test at the level would have seen 95 %.
-    """
-    history = values[:, None]
-    steps = _steps(history, base, covariance)
-    trend = fitted(history, base, years - years.mean(), covariance)
-    found = {}
-    for name, change in (("newest", steps[-1] if steps else None), ("trend", trend)):
-        if change is not None:
-            found[name] = {
-                "statistic": float(change.statistic[0]),
-                "p": change.p_value,
-                "seen": change.detectable(level),
-            }
-    if steps:
-        found["change_point"] = _change_point(steps, base, covariance, level)
-        found["homogeneity"] = _homogeneity(values, steps, base, covariance, level)
-    return found
-
-
-def _steps(values: FloatArray, base: FloatArray, covariance: FloatArray) -> list[Fitted]:
-    """Fit a step at each date but the first; the last step is that of the newest date alone."""
-    dates = np.arange(len(values))
-    fits = [fitted(values, base, floats(dates >= i), covariance) for i in dates[1:]]
-    return [fit for fit in fits if fit is not None]
-
-
-def _largest(steps: Sequence[Fitted]) -> Fitted:
-    """Return the most significant step of the first history."""
-    return max(steps, key=lambda step: float(step.statistic[0]))
-
-
-def _change_point(
-    steps: Sequence[Fitted], base: FloatArray, covariance: FloatArray, level: float
-) -> Values:
-    """Hold the largest step against those of stable histories that are drawn."""
-    # No distribution is known of the largest of several correlated statistics.
-    largest = _largest(steps)
-    total = covariance + largest.scatter[0] ** 2 * np.eye(len(base))
-    normal = np.random.default_rng(0).normal(size=(len(base), _DRAWS))
-    drawn = _steps(np.linalg.cholesky(total) @ normal, base, covariance)
-    most = np.max([step.statistic for step in drawn], axis=0)
-    statistic = float(largest.statistic[0])
-    least = min(float(step.uncertainty[0]) for step in steps)
-    factor = np.quantile(most, 1 - level) + ndtri(POWER)
-    above = 1 + np.count_nonzero(most >= statistic)
-    return {"statistic": statistic, "p": above / (_DRAWS + 1), "seen": float(factor * least)}
-
-
-def _homogeneity(
     values: FloatArray,
-    steps: Sequence[Fitted],
     base: FloatArray,
     covariance: FloatArray,
+    years: FloatArray,
+    names: Sequence[str],
     level: float,
-) -> Values:
-    """Hold the chi-square of a stable sensor against what it is by chance."""
+) -> dict[str, Values]:
+    """Return the tests of one history (n,), its dates named, that tell something, by their names.
+
+    Each has ``statistic``, ``p`` and ``seen``, the size of a step (or a change per year) of which
+    a test at the level would have seen 95 %; a change point has its size, and what it is between.
+    """
+    steps = _steps(values, base, covariance)
+    trend = fitted(values, base, years, covariance)
+    changes = {"newest": steps.get(len(values) - 1), "trend": trend}
+    found = {name: fit.test(level) for name, fit in changes.items() if fit}
+    if not steps:
+        return found
+    i = max(steps, key=lambda i: float(steps[i].statistic[0]))
+    largest = steps[i]
+    statistic = float(largest.statistic[0])
     # A step or a trend would count as scatter: that is taken from beside the largest step.
-    largest = _largest(steps)
-    freedom = len(values) - base.shape[1]
     total = covariance + largest.scatter[0] ** 2 * np.eye(len(values))
-    chi_square = float(_least_squares(base, total, values[:, None]).chi_square[0])
+    least = min(float(step.uncertainty[0]) for step in steps.values())
+    # No distribution is known of the largest of several correlated statistics.
+    normal = np.random.default_rng(0).normal(size=(len(base), _DRAWS))
+    drawn = _steps(np.linalg.cholesky(total) @ normal, base, covariance)
+    most = np.max([step.statistic for step in drawn.values()], axis=0)
+    above = 1 + np.count_nonzero(most >= statistic)
+    factor = np.quantile(most, 1 - level) + ndtri(POWER)
+    chi_square = float(_least_squares(base, total, values).chi_square)
+    freedom = len(values) - base.shape[1]
     degrees = (freedom, largest.degrees[0])
-    middle = floats(np.arange(len(values)) >= len(values) // 2)[:, None]
-    # What a step of one adds to it.
-    step = float(_least_squares(base, total, middle).chi_square[0])
+    # A step adds the square of its size over its uncertainty.
     limit = freedom * fdtri(*degrees, 1 - level)
-    seen = float(chndtrinc(limit, freedom, 1 - POWER))
     return {
-        "statistic": chi_square,
-        "p": float(fdtrc(*degrees, chi_square / freedom)),
-        "seen": float(np.sqrt(seen / step)),
+        **found,
+        "change_point": {
+            "statistic": statistic,
+            "p": float(above / (_DRAWS + 1)),
+            "seen": float(factor * least),
+            "between": names[i - 1 : i + 1],
+            **largest.stated("1"),
+        },
+        "homogeneity": {
+            "statistic": chi_square,
+            "p": float(fdtrc(*degrees, chi_square / freedom)),
+            "seen": float(np.sqrt(chndtrinc(limit, freedom, 1 - POWER))) * least,
+        },
     }
+
+
+def _steps(values: FloatArray, base: FloatArray, covariance: FloatArray) -> dict[int, Fitted]:
+    """Fit a step at each date but the first; the last step is that of the newest date alone."""
+    dates = np.arange(len(values))
+    fits = {i: fitted(values, base, floats(dates >= i), covariance) for i in dates[1:].tolist()}
+    return {i: fit for i, fit in fits.items() if fit}
 
 
 def exceeded_after(
@@ -206,31 +199,30 @@ def exceeded_after(
 
     The change since the newest date is that of the trend, with its uncertainty, and of a random
     walk: each of its sizes counts by its likelihood.  It is at most the time that the history
-    spans, beyond which nothing supports a line.
+    spans, beyond which nothing supports a line, and 0 where it is less than a day.
     """
     from scipy.optimize import brentq
 
-    ahead = years - years[-1]
-    trend = fitted(history, base, ahead, covariance)
+    trend = fitted(history, base, years, covariance)
     span = float(np.ptp(years))
     if trend is None:
         return 0.0
-    columns = np.column_stack([base, ahead])
+    columns = np.column_stack([base, years])
     total = covariance + trend.scatter[0] ** 2 * np.eye(len(years))
     since = years - years[0]
     walk = np.minimum.outer(since, since)
     own = own_variance(columns, covariance) / span
     sizes = np.sqrt(own) * _SCATTERS
     fits = [_least_squares(columns, total + size**2 * walk, history) for size in sizes]
-    likelihood = np.array([fit.likelihood[0] for fit in fits])
+    slopes, errors, likelihood, _ = map(np.ravel, zip(*fits, strict=True))
     weights = np.exp(likelihood - likelihood.max())
-    slopes = np.array([fit.value[0] for fit in fits])
-    errors = np.array([fit.uncertainty for fit in fits])
 
     def beyond(time: float) -> float:
         spread = np.sqrt((errors * time) ** 2 + sizes**2 * time)
         above = ndtr((slopes * time - tolerance) / spread)
         below = ndtr((-tolerance - slopes * time) / spread)
-        return float(weights @ (above + below) / weights.sum() - LEVEL)
+        return float(np.average(above + below, weights=weights)) - LEVEL
 
-    return span if beyond(span) < 0 else float(brentq(beyond, 1e-6, span))
+    if beyond(_DAY) > 0:
+        return 0.0
+    return span if beyond(span) < 0 else float(brentq(beyond, _DAY, span))

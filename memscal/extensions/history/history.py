@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bisect import bisect
-from collections.abc import Iterator, Sequence
+from collections.abc import Hashable, Iterator, Sequence
 from datetime import UTC, datetime, timedelta
 from os import PathLike
 
@@ -15,14 +15,13 @@ from memscal.extensions.history import shared
 from memscal.extensions.history.changes import (
     LEVEL,
     TESTS,
-    Fitted,
     change_tests,
     exceeded_after,
     fitted,
 )
+from memscal.formats.opened import require_different
 from memscal.model.apparatus import ParameterSet
 from memscal.model.arrays import (
-    ArrayPair,
     FloatArray,
     FrozenArrays,
     IndexArray,
@@ -33,8 +32,8 @@ from memscal.model.arrays import (
 from memscal.model.checks import Message
 from memscal.model.quantities import PER_MM
 from memscal.model.result import Shown
+from memscal.summaries.table import percent
 
-_LEVELS = ("conversion_constant", "gaussian_sigma")
 _DAYS = 365.25
 FEWEST = 4
 """Dates below which no date of the next calibration is proposed."""
@@ -42,9 +41,11 @@ FEWEST = 4
 _SHARES = (0.4, 0.2, 0.4)
 #: Temperatures (K) that differ by less change no sensor visibly.
 _LEAST_SPREAD = 1.0
+#: Other years are mistaken.
+_YEARS = range(1900, 3000)
 
-STAIRCASE = (
-    "A date of the next calibration takes four dates. Until then follow the staircase rule "
+_STAIRCASE = (
+    "A next date takes four dates since the last repair. Until then follow the staircase rule "
     "(ILAC-G24:2022, method 1): lengthen the interval after a calibration without a change, and "
     "shorten it after one with a change."
 )
@@ -78,7 +79,8 @@ class History(FrozenArrays, Shown):
     films : tuple of str
         Name of the film of each date.
     tests : tuple of mapping
-        Test, quantity, statistic, p-value, and ``seen``: the size that it would have seen in 95 %.
+        Test, quantity, statistic, p-value, and ``seen``: the size that it would have seen in 95 %;
+        of a change point also its size (of the logarithm), and the two dates it is ``between``.
     trend, temperature, repairs : mapping or None, mapping or None, tuple of mapping
         Slope of ln A in 1/yr; its temperature coefficient in 1/K, where temperatures differ; date
         of each repair, of the last calibration before it, and the change of ln A between them.
@@ -87,6 +89,8 @@ class History(FrozenArrays, Shown):
     next_date : str or None
         When the sensor will have changed by more than the tolerance with a probability of 5 %, in
         ISO 8601; ``None`` below four dates.
+    due : str
+        The same in words, with what limits it.
     messages : tuple of Message
         What was not named, and other notes.
 
@@ -117,23 +121,26 @@ class History(FrozenArrays, Shown):
     repairs: tuple[Values, ...]
     tolerance: float
     next_date: str | None
+    due: str
     messages: tuple[Message, ...]
 
     @property
     def changes(self) -> list[Values]:
         """Each test by the quantity that is least likely by chance, adjusted for their number."""
-        changes = []
-        for name in TESTS:
-            made = [test for test in self.tests if test["test"] == name]
-            if made:
-                least = min(made, key=lambda test: float(test["p"]))
-                changes.append({**least, "significant": bool(least["p"] < LEVEL)})
-        return changes
+        # Of each test the last one, of the least p, is kept.
+        least = {test["test"]: test for test in sorted(self.tests, key=lambda test: -test["p"])}
+        made = [least[name] for name in TESTS if name in least]
+        return [{**test, "significant": test["p"] < LEVEL} for test in made]
 
     @property
     def changed(self) -> bool:
         """Whether a change is significant."""
         return any(change["significant"] for change in self.changes)
+
+    @property
+    def tested(self) -> IndexArray:
+        """Which calibrations are tested: those since the last repair."""
+        return np.flatnonzero(np.array(self.segment) == len(self.repairs))
 
     @property
     def of_one_date(self) -> bool:
@@ -177,7 +184,8 @@ def history(
     ------
     InputError
         If the artifacts are of different sensors, channels or units, a start time or a date is
-        missing or no date, there are less than two, or the tolerance is not above zero.
+        missing or no date, there are less than two or one twice, or the tolerance is not
+        above zero.
     FormatError
         If a file is no artifact.
 
@@ -201,50 +209,65 @@ def history(
             f"The tolerance is {tolerance:g}, but it must be above zero.",
             cure="Give the relative change of A that is allowed: 0.02, or A=2%, for 2 %.",
         )
-    read = sorted(map(_read, apparatuses), key=lambda one: _moment(one.start_time))
+    read = sorted(map(_read, apparatuses), key=lambda one: moment_of(one.start_time))
     _require_one_sensor(read)
-    repaired = sorted(repairs, key=_moment)
-    ends = [*map(_moment, repaired)]
-    moments = [_moment(one.start_time) for one in read]
+    contents = [*map(_contents, read)]
+    require_different(contents)
+    labels = tuple(label for label, _ in contents)
+    repaired = sorted(repairs, key=moment_of)
+    ends = [*map(moment_of, repaired)]
+    moments = [moment_of(one.start_time) for one in read]
     # Scans of one day are of one time.
-    days = np.array([(moment.date() - moments[0].date()).days for moment in moments])
-    years = days / _DAYS
+    dates = [moment.date() for moment in moments]
+    years = np.array([(date - dates[0]).days for date in dates]) / _DAYS
+    marks = [*map(str, dates)] if len(set(dates)) == len(dates) else labels
     segment = np.array([bisect(ends, moment) for moment in moments])
     names, values, covariances = _quantities(read)
 
-    tested = np.flatnonzero(segment == segment[-1])
+    tested = np.flatnonzero(segment == len(ends))
     temperatures = _temperatures([read[i] for i in tested])
     ones = np.ones((tested.size, 1))
     base = ones if temperatures is None else np.column_stack([ones, temperatures])
     own = covariances[:, tested[:, None], tested]
-    tests = list(_tests(names, values[:, tested], own, base, years[tested]))
-    of_a = values[0, tested][:, None]
-    trend = fitted(of_a, base, years[tested] - years[-1], own[0])
+    since = years[tested]
+    marked = [marks[i] for i in tested]
+    tests: list[Values] = []
+    for i, share in enumerate(_SHARES):
+        found = change_tests(values[i, tested], base, own[i], since, marked, share * LEVEL)
+        for test, result in found.items():
+            adjusted = {**result, "p": min(result["p"] / share, 1.0)}
+            tests.append({"test": test, "quantity": names[i], **adjusted})
+    of_a = values[0, tested]
+    trend = fitted(of_a, base, since, own[0])
     next_date = None
-    if trend is not None and tested.size >= FEWEST:
-        ahead = exceeded_after(of_a, base, own[0], years[tested], tolerance)
-        next_day = moments[-1] + timedelta(days=max(ahead * _DAYS, 1.0))
-        next_date = next_day.date().isoformat()
-    by_temperature = None
-    if temperatures is not None:
-        by_temperature = fitted(of_a, ones, temperatures, own[0])
+    due = _STAIRCASE
+    if trend and np.unique(since).size >= FEWEST:
+        ahead = exceeded_after(of_a, base, own[0], since, tolerance)
+        next_date = str(dates[-1] + timedelta(days=max(ahead * _DAYS, 1.0)))
+        due = f"Next calibration: {next_date}, for a tolerance of {percent(tolerance)} of A."
+        if ahead == 0:
+            due += " It is due now: the tolerance is below the uncertainty of the history."
+        elif ahead == np.ptp(since):
+            due += " It is as far ahead as the history looks back, at most."
+    by_temperature = None if temperatures is None else fitted(of_a, ones, temperatures, own[0])
     return History(
         sensor=read[0].sensor.serial_number or read[0].sensor.name,
-        labels=tuple(one.source.file_name if one.source else one.start_time for one in read),
+        labels=labels,
         times=tuple(one.start_time for one in read),
         years=years,
         quantities=names,
         values=values,
         covariances=covariances,
-        parameters=tuple(one.parameters.only(_LEVELS) for one in read),
+        parameters=tuple(one.parameters.only(shared.LEVELS) for one in read),
         segment=tuple(segment.tolist()),
         films=tuple(one.film.name if one.film else "" for one in read),
         tests=tuple(tests),
-        trend=_stated(trend, "1/yr"),
-        temperature=_stated(by_temperature, "1/K"),
-        repairs=tuple(_repairs(repaired, read, segment, (values[0], covariances[0]))),
+        trend=trend.stated("1/yr") if trend else None,
+        temperature=by_temperature.stated("1/K") if by_temperature else None,
+        repairs=tuple(_repairs(repaired, read, segment, values[0], covariances[0])),
         tolerance=tolerance,
         next_date=next_date,
+        due=due,
         messages=tuple(_messages(read)),
     )
 
@@ -262,16 +285,27 @@ def _read(given: str | PathLike[str] | ApparatusFunction) -> ApparatusFunction:
     return apparatus
 
 
-def _moment(text: str) -> datetime:
-    """Return a time of ISO 8601; without an offset it counts as UTC."""
+def _contents(apparatus: ApparatusFunction) -> tuple[str, Hashable]:
+    """Return what names an artifact, and what tells it from another one."""
+    label = apparatus.source.file_name if apparatus.source else apparatus.start_time
+    arrays = apparatus.parameters.values, apparatus.radial_profile.g
+    return label, (apparatus.start_time, *map(bytes, arrays))
+
+
+def moment_of(text: str) -> datetime:
+    """Return a time of ISO 8601 in UTC, which it counts as without an offset."""
     try:
         moment = datetime.fromisoformat(text)
-    except ValueError as error:
+        known = moment.year in _YEARS
+    except ValueError:
+        known = False
+    if not known:
         raise InputError(
-            f"{text!r} is no date or time.",
-            cure="Write it in ISO 8601: 2026-11-20, or 2026-11-20T09:30:00+01:00.",
-        ) from error
-    return moment if moment.tzinfo else moment.replace(tzinfo=UTC)
+            f"{text!r} is no date or time of a calibration or repair.",
+            cure="Write it in ISO 8601, of the years 1900 to 2999: 2026-11-20, or "
+            "2026-11-20T09:30:00+01:00.",
+        )
+    return moment.replace(tzinfo=moment.tzinfo or UTC).astimezone(UTC)
 
 
 def _require_one_sensor(read: Sequence[ApparatusFunction]) -> None:
@@ -281,9 +315,11 @@ def _require_one_sensor(read: Sequence[ApparatusFunction]) -> None:
             f"A history takes two or more calibrations, not {len(read)}.",
             cure="Give the artifacts of all dates.",
         )
-    serials = {one.sensor.serial_number for one in read} - {""}
+    serials = {one.sensor.serial_number for one in read}
+    names = {one.sensor.name for one in read} - {""}
     stated = {
-        "sensors": serials or {one.sensor.name for one in read} - {""},
+        "sensors": serials - {""},
+        "sensors by their names": names if "" in serials else serials,
         "channels": {one.sensor.channel for one in read},
         "units": {one.reading.over(one.reading.unit) for one in read},
     }
@@ -322,72 +358,49 @@ def _temperatures(read: Sequence[ApparatusFunction]) -> FloatArray | None:
     return floats(stated) - np.mean(floats(stated))
 
 
-def _tests(
-    names: Sequence[str],
-    values: FloatArray,
-    covariances: FloatArray,
-    base: FloatArray,
-    years: FloatArray,
-) -> Iterator[Values]:
-    """Yield the tests of each quantity, with p-values adjusted for their number."""
-    for i, share in enumerate(_SHARES):
-        found = change_tests(values[i], base, covariances[i], years, share * LEVEL)
-        for test, result in found.items():
-            adjusted = {**result, "p": min(result["p"] / share, 1.0)}
-            yield {"test": test, "quantity": names[i], **adjusted}
-
-
-def _stated(fit: Fitted | None, unit: str) -> Values | None:
-    """Return a coefficient as JSON holds it."""
-    if fit is None:
-        return None
-    return {
-        "value": float(fit.value[0]),
-        "standard_uncertainty": float(fit.uncertainty[0]),
-        "unit": unit,
-    }
-
-
 def _repairs(
     repaired: Sequence[str],
     read: Sequence[ApparatusFunction],
     segment: IndexArray,
-    of_a: ArrayPair,
+    values: FloatArray,
+    covariance: FloatArray,
 ) -> Iterator[Values]:
     """Yield each repair, the last calibration before it, and how A differs after it."""
-    values, covariance = of_a
     for i, date in enumerate(repaired):
         around = np.flatnonzero((segment == i) | (segment == i + 1))
         after = floats(segment[around] > i)
         fit = fitted(
-            values[around][:, None],
+            values[around],
             np.ones((around.size, 1)),
             after,
             covariance[np.ix_(around, around)],
         )
-        before = [one.start_time for one in read if _moment(one.start_time) < _moment(date)]
-        last = before[-1] if before else None
-        yield {"date": date, "last_before": last, "change": _stated(fit, "1")}
+        before = np.flatnonzero(segment <= i)
+        last = read[before[-1]].start_time if before.size else None
+        change = fit.stated("1") if fit else None
+        yield {"date": date, "last_before": last, "change": change}
 
 
 def _messages(read: Sequence[ApparatusFunction]) -> Iterator[Message]:
     """Yield what weakens the history, and what would mend it."""
-    old = sum(not one.shared_effects for one in read)
-    if old:
-        text = (
-            f"{old} of {len(read)} artifacts state no effects of what calibrations share (they "
-            "are older than version 1.2, or their inputs are correlated): all their errors count "
-            "as new. Calibrate their scans again."
-        )
-        yield Message("history", text)
+    numbered = [bool(one.sensor.serial_number) for one in read]
+    failed = "failed a quality check."
+    lacking = {
+        failed: [not one.passed for one in read],
+        "state no effects of what they share (their artifacts are older than version 1.2, or "
+        "their inputs are correlated): all their errors count as new. Calibrate their scans "
+        "again.": [not one.shared_effects for one in read],
+        "state no serial number: they count as of the same sensor.": [
+            any(numbered) and not number for number in numbered
+        ],
+    }
     used = {shared.thing_of(source) for source in shared.sources_of(read)}
     for thing, option in shared.THINGS.items():
-        unnamed = sum(shared.identity(one, thing) is None for one in read)
-        if unnamed and thing in used:
-            what = thing.replace("_", " ")
-            text = f"{unnamed} of {len(read)} calibrations do not name the {what} ({option}): it "
-            yield Message("history", text + "counts as another one each time.")
-    failed = sum(not one.passed for one in read)
-    if failed:
-        text = f"{failed} of {len(read)} calibrations failed a quality check."
-        yield Message("history", text, "warning")
+        text = f"do not name the {thing.replace('_', ' ')} ({option}): it counts as another one "
+        lacking[text + "each time."] = [
+            thing in used and shared.identity(one, thing) is None for one in read
+        ]
+    for text, found in lacking.items():
+        if any(found):
+            counted = f"{sum(found)} of {len(read)} calibrations {text}"
+            yield Message("history", counted, "warning" if text == failed else "note")

@@ -9,8 +9,9 @@ with the signed effects c of each source by one standard uncertainty, as the art
 What is not named counts as another thing at each date.
 """
 
-from collections.abc import Hashable, Sequence
-from itertools import chain
+from collections.abc import Sequence
+from functools import reduce
+from typing import Any
 
 import numpy as np
 
@@ -19,6 +20,8 @@ from memscal.model.apparatus import ApparatusData, round_wavenumbers
 from memscal.model.arrays import FloatArray, floats
 from memscal.model.instrument import Equipment
 
+LEVELS = ("conversion_constant", "gaussian_sigma")
+"""Names of A and sigma in artifacts."""
 THINGS = {
     "film": "memscal import --film-name",
     "indenter": "memscal import --indenter-name",
@@ -44,11 +47,10 @@ _HIDDEN = ("regularisation", "window", "misfit", "baseline_curvature")
 
 def thing_of(source: str) -> str:
     """Return the thing that an uncertainty belongs to, or nothing: each date has its own."""
-    found = (thing for thing, sources in _SOURCES.items() if source in sources.split())
-    return next(found, "")
+    return next((thing for thing, sources in _SOURCES.items() if source in sources.split()), "")
 
 
-def identity(apparatus: ApparatusData, thing: str) -> Hashable:
+def identity(apparatus: ApparatusData, thing: str) -> Any:
     """Return what tells a thing from another one, ``None`` where that is not stated."""
     used = getattr(apparatus, thing, None)
     if isinstance(used, Equipment):
@@ -66,16 +68,15 @@ def identity(apparatus: ApparatusData, thing: str) -> Hashable:
 
 def sources_of(apparatuses: Sequence[ApparatusData]) -> list[str]:
     """Return the sources whose effects some artifact states."""
-    stated = chain.from_iterable(apparatus.shared_effects for apparatus in apparatuses)
-    return list(dict.fromkeys(stated))
+    return sorted(set().union(*(apparatus.shared_effects for apparatus in apparatuses)))
 
 
 def common_wavenumbers(apparatuses: Sequence[ApparatusData]) -> FloatArray:
     """Return the wavenumbers, in rad/m, at which all artifacts state effects on A G."""
-    found = [round_wavenumbers(apparatus.resolved_wavenumber) for apparatus in apparatuses]
-    common = found[0]
-    for k in found[1:]:
-        common = common[np.isin(common, k)]
+    common = reduce(
+        np.intersect1d,
+        [round_wavenumbers(apparatus.resolved_wavenumber) for apparatus in apparatuses],
+    )
     return common if all(apparatus.shared_effects for apparatus in apparatuses) else common[:0]
 
 
@@ -106,10 +107,10 @@ def covariances(apparatuses: Sequence[ApparatusData], k: FloatArray) -> FloatArr
     total = np.zeros((size, size, count, count))
     for source in sources_of(apparatuses):
         effects = np.array([_effects(one, source, k) for one in apparatuses])
-        used = [identity(one, thing_of(source)) for one in apparatuses]
-        same = np.eye(count, dtype=bool)
-        for i, thing in enumerate(used):
-            same[i] |= [thing is not None and thing == other for other in used]
+        # What is not named is another thing each time.
+        used = [identity(one, thing_of(source)) or object() for one in apparatuses]
+        first = [used.index(thing) for thing in used]
+        same = np.equal.outer(first, first)
         if source in _HIDDEN:
             # The error behind it is one.
             effects = same @ effects / np.sum(same, axis=1)[:, None]
@@ -118,13 +119,9 @@ def covariances(apparatuses: Sequence[ApparatusData], k: FloatArray) -> FloatArr
             products *= np.eye(size)[:, :, None, None]
         total += products * same
     for i, apparatus in enumerate(apparatuses):
-        _add_joint(total[:2, :2, i, i], apparatus)
+        # What an artifact states of A and sigma together beyond the sources; of an old one, all.
+        stated = apparatus.parameters.only(LEVELS)
+        relative = stated.covariance / np.outer(stated.values, stated.values)
+        own = total[:2, :2, i, i]
+        own += np.where(np.eye(2) * bool(apparatus.shared_effects), 0.0, relative - own)
     return total
-
-
-def _add_joint(total: FloatArray, apparatus: ApparatusData) -> None:
-    """Add what an artifact states of A and sigma at one date beyond the sources."""
-    names = ("conversion_constant", "gaussian_sigma")
-    stated = apparatus.parameters.only(names)
-    relative = stated.covariance / np.outer(stated.values, stated.values)
-    total += np.where(np.eye(2) * bool(apparatus.shared_effects), 0.0, relative - total)

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from memscal.extensions.history.changes import LEVEL
-from memscal.extensions.history.history import FEWEST, STAIRCASE, History
-from memscal.model.arrays import Values
+from memscal.extensions.history.history import History, moment_of
+from memscal.model.arrays import FloatArray, Values, floats
 from memscal.model.notation import format_measured
 from memscal.summaries.declared import parameters_json
 from memscal.summaries.table import Table, percent, texts_of
@@ -16,25 +16,24 @@ from memscal.summaries.table import Table, percent, texts_of
 
 def answer(history: History) -> str:
     """Return whether the sensor changed, what would have been seen, and the next date."""
-    count = len(history.times)
-    dates = f"{count} calibrations from {history.times[0][:10]} to {history.times[-1][:10]}"
+    days = [str(moment_of(history.times[i]).date()) for i in history.tested]
+    if not history.tests:
+        why = f"that takes two calibrations since the last repair, not {len(days)}"
+        return f"Nothing is tested: {why}.\n{history.due}"
+    when = f"of {days[0]}" if history.of_one_date else f"from {days[0]} to {days[-1]}"
+    dates = f"{len(days)} calibrations {when}"
     changed = [change for change in history.changes if change["significant"]]
     lines = []
     if changed:
-        found = ", ".join(f"{_words(change)} of {change['quantity']}" for change in changed)
+        found = "; ".join(map(_change, sorted(changed, key=lambda change: "between" not in change)))
         lines.append(f"The sensor has CHANGED: {dates} differ ({found}).")
-    for test in history.tests[:FEWEST]:
-        if test["test"] == "change_point" and not changed:
-            seen = f"a step of A of {_seen(test)} would have been seen in 95 %"
-            lines.append(f"No change seen in {dates}; {seen}.")
-    if history.trend is not None:
+    seen = [_seen(test) for test in history.tests if test["test"] == "change_point"]
+    if seen and not changed:
+        step = f"a step of A of {seen[0]} would have been seen in 95 %"
+        lines.append(f"No change seen in {dates}; {step}.")
+    if history.trend:
         lines.append(f"Trend of A: {_percent(history.trend)} per year.")
-    if history.next_date is not None:
-        allowed = percent(history.tolerance)
-        lines.append(f"Next calibration: {history.next_date}, for a tolerance of {allowed} of A.")
-    elif not history.of_one_date:
-        lines.append(STAIRCASE)
-    return "\n".join(lines)
+    return "\n".join([*lines, history.due])
 
 
 def tables(history: History) -> list[Table]:
@@ -51,7 +50,7 @@ def tables(history: History) -> list[Table]:
         for repair in history.repairs
     ]
     unsure = "Repairs: what was measured since the last calibration rests on no state as found"
-    pairs = [(*pair[:3], f"{pair[3]:.2f}") for pair in _pairs(history)]
+    pairs = [(*[*pair.values()][:3], f"{pair['en']:.2f}") for pair in _pairs(history)]
     return [
         Table("Tests for a change", head, tests, significant, labels=2),
         Table("Calibrations", ("date", "A", "sigma", "film", "repairs before"), _dates(history)),
@@ -64,11 +63,15 @@ def tables(history: History) -> list[Table]:
 def mapping(history: History) -> Values:
     """Return the object of ``history --json``; the contract fixes changes, trend, next_date."""
     dates = []
-    for time, film, repairs, found in zip(
-        history.times, history.films, history.segment, history.parameters, strict=True
-    ):
-        stated = {"start_time": time, "film": film, "repairs_before": repairs}
-        dates.append({**stated, **parameters_json(found)})
+    for i, found in enumerate(history.parameters):
+        dates.append(
+            {
+                "start_time": history.times[i],
+                "film": history.films[i],
+                "repairs_before": history.segment[i],
+                **parameters_json(found),
+            }
+        )
     return {
         "schema_version": "1",
         "sensor": history.sensor,
@@ -80,12 +83,18 @@ def mapping(history: History) -> Values:
         "next_date": history.next_date,
         "dates": dates,
         "repairs": list(history.repairs),
-        "pairs": [
-            {"first": first, "second": second, "quantity": quantity, "en": en}
-            for first, second, quantity, en in _pairs(history)
-        ],
+        "pairs": list(_pairs(history)),
         "notes": texts_of(history.messages),
     }
+
+
+def _change(change: Values) -> str:
+    """Return a significant change in words."""
+    if "between" not in change:
+        return f"{_words(change)} of {change['quantity']}"
+    verb = "rose" if change["value"] > 0 else "fell"
+    size = _percent(change).replace("(-", "(")
+    return f"{change['quantity']} {verb} by {size} between {' and '.join(change['between'])}"
 
 
 def _words(test: Values) -> str:
@@ -94,14 +103,16 @@ def _words(test: Values) -> str:
 
 def _seen(test: Values) -> str:
     """Return the size that a test would have seen in 95 %."""
-    return percent(test["seen"]) + (" per year" if test["test"] == "trend" else "")
+    size = percent(test["seen"]) if test["seen"] <= 1 else "over 100 %"
+    return size + (" per year" if test["test"] == "trend" else "")
 
 
 def _percent(change: Any) -> str:
-    """Return a value with its uncertainty, in percent."""
+    """Return a change of a logarithm with its uncertainty, in percent of what it was."""
     if change is None:
         return "not known: calibrations on one side of it alone"
-    return format_measured(100 * change["value"], 100 * change["standard_uncertainty"], "%")
+    share = 100 * np.exp(change["value"])
+    return format_measured(share - 100, share * change["standard_uncertainty"], "%")
 
 
 def _dates(history: History) -> list[tuple[str, ...]]:
@@ -117,26 +128,32 @@ def _changes(history: History) -> list[tuple[str, ...]]:
     """Return the changes since the first date, with what their two dates do not share."""
     rows = []
     for i in range(1, len(history.times)):
-        cells = []
-        for values, covariance in zip(history.values, history.covariances, strict=True):
-            u = _uncertainty_of_difference(covariance, 0, i)
-            cells.append(format_measured(100 * values[i], 100 * u))
+        cells = [
+            format_measured(100 * values[i], 100 * _of_differences(covariance)[0, i])
+            for values, covariance in zip(history.values, history.covariances, strict=True)
+        ]
         rows.append((history.times[i], *cells))
     return rows
 
 
-def _uncertainty_of_difference(covariance: Any, i: int, j: int) -> float:
-    variance = covariance[i, i] + covariance[j, j] - 2 * covariance[i, j]
-    return float(np.sqrt(max(variance, 0.0)))
+def _of_differences(covariance: FloatArray) -> FloatArray:
+    """Return the standard uncertainties (n, n) of differences between dates."""
+    own = np.diag(covariance)
+    return floats(np.sqrt(np.maximum(np.add.outer(own, own) - 2 * covariance, 0.0)))
 
 
-def _pairs(history: History) -> Iterator[tuple[str, str, str, float]]:
+def _pairs(history: History) -> Iterator[Values]:
     """Yield two calibrations of one day, a quantity, and its E_n by what they do not share."""
     # ISO 13528:2022, 9.7: the difference over its expanded uncertainty, k = 2.
     if not history.of_one_date:
         return
     for i, j in combinations(range(len(history.times)), 2):
         for k, quantity in enumerate(history.quantities[:2]):
-            u = _uncertainty_of_difference(history.covariances[k], i, j)
+            u = _of_differences(history.covariances[k])[i, j]
             difference = history.values[k, j] - history.values[k, i]
-            yield history.labels[i], history.labels[j], quantity, abs(difference) / (2 * u)
+            yield {
+                "first": history.labels[i],
+                "second": history.labels[j],
+                "quantity": quantity,
+                "en": float(abs(difference) / (2 * u)),
+            }

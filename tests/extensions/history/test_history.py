@@ -140,6 +140,73 @@ def test_artifacts_of_one_day_are_compared_pair_by_pair(first):
     assert found["trend"] is None
 
 
+def test_a_tolerance_below_the_uncertainty_is_due_now(first):
+    history = dated(first, [0.0, 0.03, -0.03, 0.0])
+    found = memscal.history(history, tolerance=1e-5)
+    assert found.next_date == "2021-07-02"
+    assert "due now" in found.answer()
+    far = memscal.history(history, tolerance=10.0)
+    assert far.next_date == "2022-12-30"
+    assert "for a tolerance of 1000 % of A. It is as far ahead" in far.answer()
+
+
+def test_a_next_date_takes_four_days_since_the_last_repair(first):
+    days = [f"2024-0{1 + i // 2}-01T{i:02}:00:00" for i in range(4)]
+    found = memscal.history([later(first, day, 0.001 * i) for i, day in enumerate(days)])
+    assert found.next_date is None
+    assert "four dates" in found.answer()
+
+
+def test_what_is_not_tested_since_a_repair_is_not_said_to_be_stable(first):
+    history = dated(first, [0, 0, 0.01, 0, 0.01])
+    told = memscal.history(history, repairs=["2020-09-01"]).answer()
+    assert "No change seen in 3 calibrations from 2021-01-01 to 2022-01-01" in told
+    for repair, count in (("2021-09-01", 1), ("2030-01-01", 0)):
+        found = memscal.history(history, repairs=[repair])
+        assert found.changes == []
+        assert found.next_date is None
+        assert (
+            f"Nothing is tested: that takes two calibrations since the last repair, not {count}"
+            in (found.answer())
+        )
+        assert found.plot().axes
+
+
+def test_times_are_compared_in_utc(first):
+    times = ["2025-01-01T00:30+02:00", "2024-12-31T23:00Z"]
+    found = memscal.history([later(first, time, 0.01 * i) for i, time in enumerate(times)])
+    assert found.of_one_date
+    assert found.times == tuple(times)
+    assert "2 calibrations of 2024-12-31" in found.answer()
+
+
+def test_artifacts_without_a_serial_number_are_of_the_same_sensor_by_their_name(first):
+    bare = replace(first.sensor, serial_number="")
+    found = memscal.history([first, later(first, DATES[1], sensor=bare)])
+    assert "1 of 2 calibrations state no serial number" in found.messages[0].text
+    other = later(first, DATES[1], sensor=replace(bare, name="another"))
+    with pytest.raises(InputError, match="names: a simulated sensor, another"):
+        memscal.history([first, other])
+
+
+def test_a_step_is_said_with_its_size_and_its_dates(first):
+    found = memscal.history(dated(first, np.log([1, 1, 1, 1, 0.9, 0.9, 0.9, 0.9])))
+    change = next(change for change in found.changes if change["test"] == "change_point")
+    assert change["between"] == ["2021-07-01", "2022-01-01"]
+    assert np.exp(change["value"]) == pytest.approx(0.9)
+    told = found.answer()
+    assert " fell by (10.0" in told
+    assert "between 2021-07-01 and 2022-01-01" in told
+    wild = memscal.history(dated(first, [0.0, 0.3, -0.3])).answer()
+    assert "a step of A of over 100 % would" in wild
+
+
+def test_the_figure_of_one_date_names_each_artifact(first):
+    times = [f"2025-05-01T{hour}:00:00" for hour in (10, 11)]
+    found = memscal.history([later(first, time) for time in times])
+    assert [text.get_text() for text in found.plot().axes[0].get_xticklabels()] == times
+
+
 def test_wrong_histories_are_refused(first):
     with pytest.raises(InputError, match="two or more"):
         memscal.history([first])
@@ -152,6 +219,10 @@ def test_wrong_histories_are_refused(first):
         memscal.history([first, other])
     with pytest.raises(InputError, match="tolerance"):
         memscal.history([first, first], tolerance=0.0)
+    with pytest.raises(InputError, match="given twice"):
+        memscal.history([first, later(first, DATES[1]), first])
+    with pytest.raises(InputError, match="1900 to 2999"):
+        memscal.history([first, later(first, "9999-12-31")])
 
 
 def test_the_command_writes_its_page_and_ends_with_one_where_the_sensor_changed(run, folder, first):
