@@ -1,6 +1,6 @@
 r"""The noise of a sensor at rest: its spectral density, the correlation of readings, and drift.
 
-A record U(t) is taken as white noise and exponentially correlated noise of many correlation times
+A record U(t) is taken as white noise and exponentially correlated noise of few correlation times
 :math:`\tau_i`, with the autocovariance and the one-sided spectral density
 
 .. math::
@@ -126,7 +126,8 @@ def noise_of(record: Scan) -> NoiseRecord:
     slow = 2 * step * (1 - decay**2) / (1 - 2 * decay * turn + decay**2)
     densities = np.column_stack([np.full(len(slow), 2 * step), slow])
     variances = _most_likely(power[lines], densities)
-    return NoiseRecord(step, float(variances[0]), times, variances[1:], duration)
+    found = variances[1:] > 0
+    return NoiseRecord(step, float(variances[0]), times[found], variances[1:][found], duration)
 
 
 def _most_likely(power: FloatArray, densities: FloatArray) -> FloatArray:
