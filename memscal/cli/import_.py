@@ -100,7 +100,7 @@ def _take_recipe(context: click.Context, _: click.Parameter, path: Path | None) 
         hook("read_recipe")(context, path)
 
 
-class _Time(click.ParamType):  # type: ignore[type-arg]
+class _Time(click.ParamType):  # type: ignore[type-arg] # older releases of click are not generic
     """A date or a time of ISO 8601, which stays text."""
 
     name = "time"
