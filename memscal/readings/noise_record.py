@@ -125,9 +125,9 @@ def noise_of(record: Scan) -> NoiseRecord:
     turn = np.cos(2 * np.pi * frequency[lines, None] * step)
     slow = 2 * step * (1 - decay**2) / (1 - 2 * decay * turn + decay**2)
     densities = np.column_stack([np.full(len(slow), 2 * step), slow])
-    variances = _most_likely(power[lines], densities)
-    found = variances[1:] > 0
-    return NoiseRecord(step, float(variances[0]), times[found], variances[1:][found], duration)
+    white, *variances = _most_likely(power[lines], densities)
+    found = np.flatnonzero(variances)
+    return NoiseRecord(step, float(white), times[found], np.array(variances)[found], duration)
 
 
 def _most_likely(power: FloatArray, densities: FloatArray) -> FloatArray:
@@ -194,9 +194,9 @@ def with_recorded_noise(scan: Scan) -> Scan:
             cure="Import it with its times (memscal import --time), or state the noise (--noise).",
         )
     untimed = np.isfinite(scan.u_zz) & ~np.isfinite(scan.time)
-    passes = scan.time.reshape(1 if scan.planar else -1, -1 if scan.planar else scan.x.size)
+    passes = scan.time.reshape(-1, scan.time.size if scan.planar else scan.x.size)
     repeated = [np.unique(row[np.isfinite(row)], return_counts=True)[1] for row in passes]
-    again = int(np.sum(np.concatenate(repeated) - 1))
+    again = np.sum(np.concatenate(repeated) - 1)
     if untimed.any() or again:
         raise InputError(
             f"{name} states no time of {counted(untimed.sum(), 'readings')}, and of {again} that "
@@ -217,7 +217,7 @@ def with_recorded_noise(scan: Scan) -> Scan:
         first = passes[0][: scan.x.size]
         lasts = np.nanmax(first) - np.nanmin(first)
         share = scan.averaging_length / np.abs(np.diff(scan.x)).sum()
-        samples = max(round(float(share * lasts / noise.step)), 1)
+        samples = max(round(share * lasts / noise.step), 1)
     covariance = np.nan_to_num(noise.covariance(lags, samples))
     variance = float(noise.covariance(np.zeros(1), samples)[0])
     correlation = covariance / variance
