@@ -38,6 +38,10 @@ COMMANDS = {
         "extensions.history.command",
         "Say whether a sensor has changed since its last calibrations.",
     ),
+    "locate": (
+        "extensions.arrays.command",
+        "Find where contacts press on an array of sensors, and how strongly.",
+    ),
     "simulate": (
         "extensions.simulation.command",
         "Make a synthetic scan, or the scans of an experiment.",
@@ -58,6 +62,15 @@ VIEWS = {
     "Holds": ("", "figures.holds.holds_figure"),
     "MeasuredStress": ("summaries.stress", "figures.stress.measured_stress_figure"),
     "Restoration": ("summaries.restoration", "figures.stress.restoration_figure"),
+    "ArrayCalibration": (
+        "extensions.arrays.summary",
+        "extensions.arrays.figure.array_figure",
+    ),
+    "Contacts": (
+        "extensions.arrays.contacts_summary",
+        "extensions.arrays.contacts_figure.contacts_figure",
+    ),
+    "SensorArray": ("extensions.arrays.summary", "extensions.arrays.figure.array_figure"),
     "Design": ("extensions.planning.summary", "extensions.planning.figure.design_figure"),
     "History": ("extensions.history.summary", "extensions.history.figure.history_figure"),
     "FleetResults": ("extensions.fleet.results_summary", "extensions.fleet.figure.fleet_figure"),
@@ -112,6 +125,9 @@ HOOKS = {
 """Function by which a room calls what stands above it, or an extension: its module."""
 
 PUBLIC = {
+    "extensions.arrays.calibrate_array": ["ArrayCalibration", "calibrate_array"],
+    "extensions.arrays.contacts": ["Contacts"],
+    "extensions.arrays.sensor_array": ["SensorArray", "load_array"],
     "extensions.fleet.many": ["FleetCalibration", "calibrate_many"],
     "extensions.history.history": ["History", "history"],
     "extensions.interface_laws.results": ["InterfaceComparison"],

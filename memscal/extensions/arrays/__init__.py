@@ -1,0 +1,1 @@
+"""Arrays of sensors under one film: crosstalk, places, forces."""

@@ -1,0 +1,77 @@
+"""Arrays of sensors of which everything is known, and what an independent layer makes them read."""
+
+import numpy as np
+
+from memscal.axisymmetry.hankel import Wavenumbers
+from memscal.axisymmetry.kernels import gaussian_transfer
+from memscal.extensions.arrays.array_data import ArrayReadings, KernelModes
+from memscal.extensions.arrays.sensor_array import SensorArray
+from memscal.model.film import ElasticFilm
+from memscal.model.indenter import Rod
+from memscal.model.provenance import Process
+
+FILM = ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
+ROD = Rod(radius=0.25e-3)
+SIGMA = 561e-6
+A = 40e-9  # V/Pa
+
+
+def layout(rows: int, columns: int, pitch: float = 2e-3) -> np.ndarray:
+    """Places of a grid about the origin, (rows columns, 2), in m."""
+    y, x = np.mgrid[:rows, :columns]
+    places = np.stack([x.ravel(), y.ravel()], axis=1).astype(float)
+    return pitch * (places - places.mean(axis=0))
+
+
+def near(places: np.ndarray) -> np.ndarray:
+    """Which pairs are neighbours, (n, n)."""
+    apart = np.hypot(*(places[:, None] - places).T)
+    np.fill_diagonal(apart, np.inf)
+    return apart < 1.3 * apart.min()
+
+
+def known_array(
+    rows: int,
+    columns: int,
+    *,
+    pitch: float = 2e-3,
+    crosstalk: float = 0.01,
+    noise: float = 0.01,
+    sigma: float = SIGMA,
+    uncertainty: float = 0.0,
+) -> SensorArray:
+    """An array of Gaussian G; noise in parts of the largest reading at 1 N, uncertainty of ln A."""
+    places = layout(rows, columns, pitch)
+    n = len(places)
+    neighbours = near(places)
+    k = Wavenumbers.covering(20 / FILM.thickness, 40e-3).k
+    peak = A * 1.0 / FILM.thickness**2
+    parameters = 3 * n + neighbours.sum()
+    root = np.zeros((parameters, n))
+    root[:n] = uncertainty * np.eye(n)
+    none = np.zeros(0)
+    nothing = np.zeros((n, 0))
+    centres = places.copy()
+    if rows == 1:
+        centres[:, 1] = np.nan
+    return SensorArray(
+        sensors=tuple(f"T{i:02d}" for i in range(n)),
+        used=np.ones(n, bool),
+        conversion_constants=np.full(n, A),
+        centres=centres,
+        crosstalk=np.where(neighbours, crosstalk, np.eye(n)),
+        estimated=neighbours,
+        gaussian_sigmas=np.full(n, sigma),
+        baselines=np.zeros(n),
+        noise=(noise * peak) ** 2 * np.eye(n),
+        k=k,
+        kernels=gaussian_transfer(k, sigma)[None],
+        modes=KernelModes(np.zeros((0, k.size)), np.zeros(0, np.intp)),
+        root=root,
+        effects={},
+        film=FILM,
+        indenter=ROD,
+        load=1.0,
+        readings=ArrayReadings(none, none, none, nothing, nothing, nothing),
+        process=Process.of_now(),
+    )
