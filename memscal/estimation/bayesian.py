@@ -366,8 +366,6 @@ class Weighing:
     def average(self) -> WeighedFit:
         """Average mean and gain by one set of probabilities, squared errors by the other."""
         given = self.given
-        model = self.reduced.model
-        fit = self.reduced.fit
         probabilities = []
         for prior in self.priors:
             # Bayes' theorem; negligible probabilities are set to zero.
@@ -397,7 +395,7 @@ class Weighing:
             gain=self.reduced.by_voltages(gain[:, : self.reduced.data.size]),
             noise=float(np.sqrt(p @ used.scatter)),
             probability=estimate,
-            residual=model.points.u - fit.predicted - self.basis.voltages(model, fit, mean),
+            residual=self.reduced.residual(self.basis, mean),
             log_marginals=self.log_marginals,
         )
 

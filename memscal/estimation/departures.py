@@ -206,6 +206,11 @@ class ReducedScan:
         voltages = self.model.signal(self.fit.geometry, kernels)
         return self.model.points.standardised(voltages, self.weights)
 
+    def residual(self, basis: DepartureBasis, mean: FloatArray) -> FloatArray:
+        """Voltages (n,) that a combination (p,) of all columns does not explain, in V."""
+        model = self.model
+        return model.points.u - self.fit.predicted - basis.voltages(model, self.fit, mean)
+
     def by_voltages(self, gain: FloatArray) -> VoltageMap:
         """Derivatives by the voltages (m, n) of numbers with these by the reduced data, (m, r)."""
         if self.right is not None:

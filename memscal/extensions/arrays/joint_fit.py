@@ -1,0 +1,371 @@
+r"""Joint fit of an array: everything of each sensor, one shape of G, crosstalk, noise.
+
+What is each sensor's own is integrated out in closed form, with a prior for the crosstalk; what is
+left is data and kernels of one sensor, of which the shape of G is found as that of a single one
+(:mod:`memscal.estimation.bayesian`).  The prior of the crosstalk is
+
+.. math::
+
+    c_{ij} = m + e_{ij}, \qquad m \sim N(0,\,0.05^2), \qquad e_{ij} \sim N(0,\,t^2),
+
+averaged over t by its marginal likelihood.  A prior about zero would take a common crosstalk for a
+ring of the common G.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+
+from memscal.axisymmetry.kernels import gaussian_transfer, gaussian_transfer_slope
+from memscal.errors import FitError
+from memscal.estimation import bayesian
+from memscal.estimation.departures import SHAPES, ReducedScan, departure_basis
+from memscal.estimation.forward import ForwardModel
+from memscal.estimation.gaussian import GaussianFit
+from memscal.estimation.voltage_map import VoltageMap, square_root
+from memscal.extensions.arrays.joint_model import ArrayState, Information, JointModel, Layout, Noise
+from memscal.extensions.arrays.presses import Presses, Waves
+from memscal.model.arrays import ArrayPair, BoolArray, FloatArray, array_record
+
+#: Standard deviations of crosstalk about its mean that are weighed, and that of the mean.
+SPREADS = (0.0005, 0.001, 0.002, 0.005, 0.01, 0.02, 0.05)
+WIDEST = SPREADS[-1]
+#: Those of less probability are left out.
+_NEGLIGIBLE = 1e-3
+#: Standard deviation of what is a sensor's own: ln width, and departures over the Gaussian's size.
+OWN_WIDTH = 0.05
+_OWN_SHAPE = 0.05
+_MOST_ROUNDS = 25
+_SHAPE_ROUNDS = 5
+#: Steps end below this share of a standard uncertainty.
+_SETTLED = 0.02
+#: The longest step, in ln g or in widths of G.
+_LONGEST = 0.5
+
+
+@array_record
+class ReducedArray(ReducedScan):
+    """Data and kernels of an array, of which all else is integrated out."""
+
+    def signal(self, kernels: FloatArray) -> FloatArray:
+        """Voltages (r, m) of round kernels by their transforms, (nodes, m)."""
+        assert self.synthesis is not None
+        return self.synthesis @ kernels
+
+    def by_voltages(self, gain: FloatArray) -> VoltageMap:
+        """Derivatives by the reduced data: what is each sensor's own is integrated out."""
+        return VoltageMap(((gain, np.eye(gain.shape[1])),))
+
+    def residual(self, basis: Any, mean: FloatArray) -> FloatArray:
+        """Nothing: the residuals are those of the array."""
+        return np.zeros(0)
+
+
+@array_record
+class Posterior:
+    """What a spread of crosstalk, or several, leave of parameters and of the common kernel."""
+
+    log_evidence: float
+    change: FloatArray  # (p,): of the parameters
+    kernel: FloatArray  # (nodes,): transform of the common kernel, in V/Pa
+    root: FloatArray  # (p + nodes, c): of the covariance of both
+    gain: FloatArray  # (p + nodes, f): changes of both by kernels (f,) that the readings add
+
+
+@array_record
+class JointFit:
+    """The posterior of an array."""
+
+    model: JointModel
+    state: ArrayState
+    noise: Noise
+    information: Information
+    gaussian: GaussianFit
+    posterior: Posterior
+    widest: Posterior  # by the widest prior of the crosstalk
+
+    @property
+    def residual(self) -> FloatArray:
+        """Readings that are not explained, (m, t), in V; zero where not kept."""
+        presses = self.model.presses
+        return np.where(presses.keep, presses.u - self.model.predicted(self.state), 0.0)
+
+
+def crosstalk_precision(layout: Layout, spread: float) -> ArrayPair:
+    """Return places (c,) of the crosstalk among the parameters, and its prior precision."""
+    places = layout.crosstalk[layout.crosstalk >= 0]
+    count = places.size
+    # Of t^2 1 + m^2 1 1', by Sherman and Morrison.
+    alike = WIDEST**2 / (spread**2 + count * WIDEST**2) if count else 0.0
+    return places, (np.eye(count) - alike) / spread**2
+
+
+def prior_precision(layout: Layout, spread: float) -> FloatArray:
+    """Return the prior precision of all parameters, (p, p); zero of what has a flat prior."""
+    precision = np.zeros((layout.count, layout.count))
+    places, of_crosstalk = crosstalk_precision(layout, spread)
+    precision[np.ix_(places, places)] = of_crosstalk
+    if layout.own.size:
+        precision[layout.own, layout.own] = np.append(
+            1 / OWN_WIDTH**2, np.full(layout.own.shape[1] - 1, 1 / _OWN_SHAPE**2)
+        )
+    return precision
+
+
+def parameters_of(layout: Layout, state: ArrayState) -> FloatArray:
+    """Return the parameters that have a prior, (p,); zero of all others."""
+    values = np.zeros(layout.count)
+    estimated = layout.crosstalk >= 0
+    values[layout.crosstalk[estimated]] = state.crosstalk[estimated]
+    values[layout.own] = state.own
+    return values
+
+
+class Normal:
+    """Normal equations with a prior, solved."""
+
+    def __init__(self, matrix: FloatArray) -> None:
+        diagonal = np.diag(matrix)
+        if not np.all(diagonal > 0):
+            raise _undetermined()
+        self._scale = diagonal**-0.5
+        try:
+            self._factor = cho_factor(self._scale[:, None] * matrix * self._scale)
+        except np.linalg.LinAlgError:
+            raise _undetermined() from None
+
+    def solve(self, right: FloatArray) -> FloatArray:
+        """Return the solution for right-hand sides (p,) or (p, n)."""
+        scaled = cho_solve(self._factor, (right.T * self._scale).T)
+        return (scaled.T * self._scale).T
+
+    @property
+    def log_determinant(self) -> float:
+        """Logarithm of the determinant."""
+        diagonal = np.diag(self._factor[0])
+        return float(2 * (np.log(diagonal) - np.log(self._scale)).sum())
+
+
+def _undetermined() -> FitError:
+    return FitError(
+        "The scan does not determine the array: a sensor has too few readings about its centre.",
+        cure="Scan past every sensor, or leave the sensor out (used).",
+    )
+
+
+def fit_gaussian(
+    model: JointModel, state: ArrayState, noise: Noise, gaussian: GaussianFit
+) -> tuple[ArrayState, GaussianFit]:
+    """Fit everything with a Gaussian of a common width, by damped Gauss-Newton steps."""
+    layout = model.layout
+    presses = model.presses
+    precision = prior_precision(layout, WIDEST)
+    widths = np.array([gaussian.conversion_constant, gaussian.sigma])
+    k = gaussian.geometry.k
+    best = np.inf
+    step = np.zeros(layout.count + 2)
+    tried = (state, widths)
+    for _ in range(_MOST_ROUNDS):
+        a, sigma = tried[1]
+        columns = np.stack([gaussian_transfer(k, sigma), a * gaussian_transfer_slope(k, sigma)], 1)
+        columns = model.waves.mix @ columns
+        place = replace(tried[0], kernel=a * columns[:, 0])
+        data = presses.u - model.predicted(place)
+        information = model.information(place, noise, columns, data)
+        values = parameters_of(layout, place)
+        cost = information.gram[0, 0] + values @ precision @ values
+        if not cost <= best * (1 + 1e-12):
+            step = step / 2
+            tried = _stepped(model, state, widths, step)
+            continue
+        state, widths, best = place, tried[1], cost
+        matrix = information.gram[1:, 1:].copy()
+        right = information.gram[1:, 0].copy()
+        matrix[: layout.count, : layout.count] += precision
+        right[: layout.count] -= precision @ values
+        normal = Normal(matrix)
+        step = normal.solve(right)
+        decrease = step @ right
+        size = max(
+            abs(step[layout.centres]).max() / sigma,
+            abs(step[: len(presses.u) - 1]).max(initial=0.0),
+            abs(step[-1]) / sigma,
+        )
+        step *= min(1.0, _LONGEST / size)
+        tried = _stepped(model, state, widths, step)
+        if decrease < _SETTLED**2:
+            break
+    a, sigma = widths
+    if not (a > 0 and sigma > 0):
+        raise _undetermined()
+    return state, replace(gaussian, conversion_constant=float(a), sigma=float(sigma))
+
+
+def _stepped(
+    model: JointModel, state: ArrayState, widths: FloatArray, step: FloatArray
+) -> tuple[ArrayState, FloatArray]:
+    moved = model.layout.moved(state, step[:-2], model.presses.axes)
+    changed = widths + step[-2:]
+    # A width has no sign.
+    return moved, np.array([changed[0], max(abs(changed[1]), 0.1 * widths[1])])
+
+
+def noise_of(presses: Presses, residual: FloatArray, parameters: float) -> Noise:
+    """Estimate each sensor's own noise, and what is common to a board, from residuals (m, t)."""
+    count = presses.keep.sum(axis=1)
+    both = presses.keep.astype(float) @ presses.keep.T
+    freedom = np.maximum(1 - parameters / count, 0.1)
+    square = residual @ residual.T / np.maximum(both, 1)
+    square /= np.sqrt(np.outer(freedom, freedom))
+    common = np.zeros(presses.board.max() + 1)
+    of_board = np.zeros(len(residual))
+    for i in range(common.size):
+        members = np.flatnonzero(presses.board == i)
+        if members.size > 1:
+            block = square[np.ix_(members, members)]
+            pairs = np.triu_indices(members.size, 1)
+            common[i] = max(np.mean(block[pairs]), 0.0)
+            of_board[members] = common[i]
+    total = np.diag(square)
+    if presses.stated is not None:
+        stated = np.sum(presses.stated**2, axis=1, where=presses.keep) / count
+        total = np.maximum(total, stated)
+    floor = (1e-7 * np.ptp(presses.u, axis=1)) ** 2
+    return Noise(np.maximum(total - of_board, np.maximum(0.02 * total, floor)), common)
+
+
+def fit_array(
+    model: JointModel, state: ArrayState, noise: Noise, gaussian: GaussianFit, forward: ForwardModel
+) -> JointFit:
+    """Fit an array from a start: a Gaussian first, then the shape of G that is common to all."""
+    presses = model.presses
+    for _ in range(2):
+        state, gaussian = fit_gaussian(model, state, noise, gaussian)
+        noise = _noise(model, state)
+    kernel = state.kernel
+    everything = np.eye(len(model.waves.mix))
+    for _ in range(_SHAPE_ROUNDS):
+        about = replace(state, kernel=model.waves.mix @ _gaussian(gaussian))
+        data = presses.u - model.predicted(about)
+        information = model.information(state, noise, everything, data)
+        posteriors = [
+            posterior(model, information, state, gaussian, forward, spread)
+            for spread in _spreads(model.layout)
+        ]
+        averaged = average(posteriors)
+        moved = model.layout.moved(state, averaged.change, presses.axes)
+        kernel = model.waves.mix @ averaged.kernel
+        state = replace(moved, kernel=kernel)
+        noise = _noise(model, state)
+        size = np.sqrt(np.sum(averaged.root[: model.layout.count] ** 2, axis=1))
+        if np.all(abs(averaged.change) < 5 * _SETTLED * size):
+            break
+    return JointFit(model, state, noise, information, gaussian, averaged, posteriors[-1])
+
+
+def _spreads(layout: Layout) -> Sequence[float]:
+    return SPREADS if np.any(layout.crosstalk >= 0) else SPREADS[-1:]
+
+
+def _gaussian(gaussian: GaussianFit) -> FloatArray:
+    transfer = gaussian_transfer(gaussian.geometry.k, gaussian.sigma)
+    return gaussian.conversion_constant * transfer
+
+
+def _noise(model: JointModel, state: ArrayState) -> Noise:
+    presses = model.presses
+    residual = np.where(presses.keep, presses.u - model.predicted(state), 0.0)
+    return noise_of(presses, residual, model.layout.count / len(presses.u))
+
+
+def posterior(
+    model: JointModel,
+    information: Information,
+    state: ArrayState,
+    gaussian: GaussianFit,
+    forward: ForwardModel,
+    spread: float,
+) -> Posterior:
+    """Integrate out what is each sensor's own, and weigh the shapes of the common G."""
+    layout = model.layout
+    precision = prior_precision(layout, spread)
+    gram = information.gram.copy()
+    own = information.parameters
+    values = parameters_of(layout, state)
+    gram[own, own] += precision
+    gram[own, 0] -= precision @ values
+    gram[0, own] = gram[own, 0]
+    gram[0, 0] += values @ precision @ values
+    normal = Normal(gram[own, own])
+    others = information.others
+    by_others = normal.solve(gram[own][:, others])
+    left = gram[np.ix_(others, others)] - gram[own][:, others].T @ by_others
+    columns = _root_of(left)
+    count = information.readings - layout.count
+    reduced = _reduced(columns, model.waves, gaussian, forward)
+    basis = departure_basis(gaussian, reduced)
+    weighing = bayesian.weigh_departures(reduced, basis, count, least_noise=1.0)
+    weighed = weighing.average()
+    kernels = basis.kernels(forward.k)
+    combined = model.waves.mix @ kernels
+    # The parameters given a kernel: what they are without it, less what it explains of them.
+    by_kernel = by_others[:, 1:] @ combined
+    change = by_others[:, 0] - by_kernel @ weighed.mean
+    of_kernel = square_root(weighed.covariance, np.diag(weighed.covariance))
+    of_own = np.linalg.cholesky(normal.solve(np.eye(layout.count)))
+    root = np.block(
+        [
+            [of_own, -by_kernel @ of_kernel],
+            [np.zeros((len(kernels), layout.count)), kernels @ of_kernel],
+        ]
+    )
+    kernel_gain = weighed.gain.dense() @ columns[:, 1:]
+    gain = np.vstack([by_others[:, 1:] - by_kernel @ kernel_gain, kernels @ kernel_gain])
+    evidence = weighing.evidence - 0.5 * normal.log_determinant
+    places, of_crosstalk = crosstalk_precision(layout, spread)
+    evidence += 0.5 * np.linalg.slogdet(of_crosstalk)[1]
+    kernel = _gaussian(gaussian) + kernels @ weighed.mean
+    return Posterior(float(evidence), change, kernel, root, gain)
+
+
+def _root_of(gram: FloatArray) -> FloatArray:
+    """Return columns whose products these are."""
+    scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
+    values, vectors = np.linalg.eigh(gram / np.outer(scale, scale))
+    return np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T * scale
+
+
+def _reduced(
+    columns: FloatArray, waves: Waves, gaussian: GaussianFit, forward: ForwardModel
+) -> ReducedArray:
+    """Return data and kernels in the place of a reduced scan, about a Gaussian."""
+    synthesis = columns[:, 1:] @ waves.mix
+    k = forward.k
+    slope = gaussian.conversion_constant * gaussian_transfer_slope(k, gaussian.sigma)
+    flat = synthesis @ np.stack([gaussian_transfer(k, gaussian.sigma), slope], axis=1)
+    none = np.zeros((len(columns), 0))
+    weights = np.ones(len(columns))
+    return ReducedArray(forward, gaussian, columns[:, 0], flat, none, weights, synthesis, None)
+
+
+def average(posteriors: Sequence[Posterior]) -> Posterior:
+    """Average posteriors by their evidence; their differences count as uncertainty."""
+    evidence = np.array([each.log_evidence for each in posteriors])
+    weight = np.exp(evidence - evidence.max())
+    weight[weight < _NEGLIGIBLE * weight.sum()] = 0.0
+    weight /= weight.sum()
+    likely = [(w, each) for w, each in zip(weight, posteriors, strict=True) if w]
+    change = sum(w * each.change for w, each in likely)
+    kernel = sum(w * each.kernel for w, each in likely)
+    mean = np.append(change, kernel)
+    columns = []
+    for w, each in likely:
+        apart = np.append(each.change, each.kernel) - mean
+        columns += [np.sqrt(w) * each.root, np.sqrt(w) * apart[:, None]]
+    gain = sum(w * each.gain for w, each in likely)
+    return Posterior(float(evidence.max()), change, kernel, np.hstack(columns), gain)

@@ -1,0 +1,218 @@
+r"""The readings of an array linearised in everything that is common, and in each sensor's own.
+
+Of all sensors at once the model is
+
+.. math::
+
+    u_i(t) = b_i + d_i\tau_t + \sum_j C_{ij}\,g_j\,P_t\,(K_j \otimes \sigma)(|r_t - c_j|) + n_i(t),
+    \qquad n(t) \sim N(0,\; D + V_t V_t^T)
+
+with one kernel K of all, or changes of it of each sensor's own; the columns V of what is common to
+the readings of one press are those of the electronics of a board, of the place of the rod and of
+its load.  Only the normal equations are kept: of 64 sensors and 4,225 presses the derivatives are
+a gigabyte.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from memscal.extensions.arrays.presses import Presses, Waves
+from memscal.model.arrays import BoolArray, FloatArray, IndexArray, array_record
+
+
+@array_record
+class ArrayState:
+    """Where the model is linearised: all numbers of m sensors."""
+
+    gain: FloatArray  # (m,): of each, over that of the largest one
+    centres: FloatArray  # (m, 2), in m
+    crosstalk: FloatArray  # (m, m), with ones on the diagonal
+    drift: FloatArray  # (m, d), in V
+    kernel: FloatArray  # (f,): of all, by its combination of the waves, in V/Pa
+    own: FloatArray  # (m, o): sizes of each sensor's own changes of it
+
+
+@array_record
+class Noise:
+    """Noise of m sensors: each one's own, and what the sensors of a board have in common."""
+
+    own: FloatArray  # (m,): variance, in V^2
+    common: FloatArray  # (boards,): variance, in V^2
+
+
+@array_record
+class Layout:
+    """Places of the parameters: ln g of all but the largest, centres, c, drifts, own changes."""
+
+    gains: IndexArray  # (m,): -1 of the largest
+    centres: IndexArray  # (axes, m)
+    crosstalk: IndexArray  # (m, m): -1 where not estimated
+    drift: IndexArray  # (m, d)
+    own: IndexArray  # (m, o)
+    count: int
+
+    @classmethod
+    def of(cls, presses: Presses, pairs: BoolArray, largest: int, own: int) -> Layout:
+        """Count the parameters of an array with crosstalk of pairs (m, m)."""
+        m = len(presses.u)
+        sizes = [m - 1, len(presses.axes) * m, int(pairs.sum()), m * presses.drift.shape[1]]
+        ends = np.cumsum([*sizes, m * own])
+        parts = np.split(np.arange(ends[-1]), ends[:-1])
+        gains = np.insert(parts[0], largest, -1)
+        crosstalk = np.full(pairs.shape, -1)
+        crosstalk[pairs] = parts[2]
+        return cls(
+            gains,
+            parts[1].reshape(-1, m),
+            crosstalk,
+            parts[3].reshape(m, -1),
+            parts[4].reshape(m, -1),
+            int(ends[-1]),
+        )
+
+    def moved(self, state: ArrayState, change: FloatArray, axes: tuple[int, ...]) -> ArrayState:
+        """Return a state changed by the parameters (p,)."""
+        gain = state.gain * np.exp(np.where(self.gains < 0, 0.0, change[self.gains]))
+        centres = state.centres.copy()
+        centres[:, axes] += change[self.centres].T
+        crosstalk = state.crosstalk + np.where(self.crosstalk < 0, 0.0, change[self.crosstalk])
+        return replace(
+            state,
+            gain=gain,
+            centres=centres,
+            crosstalk=crosstalk,
+            drift=state.drift + change[self.drift],
+            own=state.own + change[self.own],
+        )
+
+
+@array_record
+class Information:
+    """Weighted sums of products of the residuals, of p parameters and of q kernels."""
+
+    gram: FloatArray  # (1 + p + q, 1 + p + q)
+    count: int  # p
+    readings: int
+
+    @property
+    def parameters(self) -> slice:
+        """Places of the parameters."""
+        return slice(1, 1 + self.count)
+
+    @property
+    def others(self) -> FloatArray:
+        """Places of the residuals and of the kernels."""
+        return np.delete(np.arange(len(self.gram)), self.parameters)
+
+
+@array_record
+class JointModel:
+    """Readings of an array of which pairs have crosstalk, with own changes of the kernels."""
+
+    presses: Presses
+    waves: Waves
+    layout: Layout
+    own: FloatArray  # (f, o): changes of a sensor's own kernel
+
+    def distances(self, state: ArrayState) -> tuple[FloatArray, FloatArray]:
+        """Distances of the presses from each centre, (m, t), and their slopes by it, (2, m, t)."""
+        offset = self.presses.places[:, None] - state.centres.T[:, :, None]
+        radius = np.hypot(*offset)
+        return radius, -offset / np.where(radius > 0, radius, 1.0)
+
+    def signals(self, state: ArrayState) -> tuple[FloatArray, FloatArray]:
+        """What each sensor would read without crosstalk, (m, t), and its slope by the distance."""
+        radius, _ = self.distances(state)
+        kernels = state.kernel[:, None] + self.own @ state.own.T
+        signals = np.empty(radius.shape)
+        slopes = np.empty(radius.shape)
+        common = not state.own.any()
+        profiles = self.waves.profiles(kernels[:, :1] if common else kernels)
+        for j, distance in enumerate(radius):
+            column = 0 if common else j
+            factor = state.gain[j] * self.presses.load
+            signals[j] = factor * profiles(distance)[:, column]
+            slopes[j] = factor * profiles(distance, 1)[:, column]
+        return signals, slopes
+
+    def predicted(self, state: ArrayState) -> FloatArray:
+        """All readings, (m, t), in V."""
+        signals, _ = self.signals(state)
+        return state.crosstalk @ signals + state.drift @ self.presses.drift.T
+
+    def information(
+        self, state: ArrayState, noise: Noise, kernels: FloatArray, data: FloatArray
+    ) -> Information:
+        """Linearise about a state, with kernels (f, q) of all sensors, for residuals (m, t)."""
+        presses = self.presses
+        layout = self.layout
+        p = layout.count
+        q = kernels.shape[1]
+        radius, towards = self.distances(state)
+        signals, slopes = self.signals(state)
+        moved = [slopes * towards[axis] for axis in presses.axes]
+        profiles = self.waves.profiles(np.hstack([kernels, self.own]))
+        factors = state.gain[:, None] * presses.load
+        by_kernel = [f[:, None] * profiles(r) for f, r in zip(factors, radius, strict=True)]
+        common = self._common(state, noise, signals, moved[0])
+        gram = np.zeros((1 + p + q, 1 + p + q))
+        shared = np.zeros((len(common), presses.load.size, 1 + p + q))
+        kernel_places = np.arange(1 + p, 1 + p + q)
+        for i, row in enumerate(state.crosstalk):
+            near = np.flatnonzero((row != 0) | (layout.crosstalk[i] >= 0))
+            names = [np.zeros(1, np.intp), 1 + layout.drift[i]]
+            columns = [data[i][:, None], presses.drift]
+            of_all = np.zeros((presses.load.size, q))
+            for j in near:
+                whole = by_kernel[j]
+                of_all += row[j] * whole[:, :q]
+                parts = [signals[j] * row[j], *(row[j] * change[j] for change in moved)]
+                places = [layout.gains[j], *layout.centres[:, j]]
+                if i != j:
+                    parts.append(signals[j])
+                    places.append(layout.crosstalk[i, j])
+                parts += list(row[j] * whole[:, q:].T)
+                places += list(layout.own[j])
+                known = np.array(places) >= 0
+                columns.append(np.stack(parts, axis=1)[:, known])
+                names.append(1 + np.array(places)[known])
+            columns.append(of_all)
+            names.append(kernel_places)
+            weight = presses.keep[i] / noise.own[i]
+            block = np.hstack(columns)
+            index = np.concatenate(names)
+            weighted = weight[:, None] * block
+            gram[np.ix_(index, index)] += block.T @ weighted
+            for level, change in zip(shared, common, strict=True):
+                level[:, index] += change[i][:, None] * weighted
+        if len(common):
+            gram -= self._in_common(common, noise, shared)
+        return Information(gram, p, int(presses.keep.sum()))
+
+    def _common(
+        self, state: ArrayState, noise: Noise, signals: FloatArray, moved: FloatArray
+    ) -> FloatArray:
+        """What one deviation of each thing in common to a press does, (c, m, t), in V."""
+        presses = self.presses
+        boards = [
+            np.sqrt(variance) * np.broadcast_to((presses.board == i)[:, None], signals.shape)
+            for i, variance in enumerate(noise.common)
+        ]
+        errors = [
+            presses.place_errors * (state.crosstalk @ -moved),
+            presses.load_errors * (state.crosstalk @ signals),
+        ]
+        stated = [change for change in [*boards, *errors] if change.any()]
+        return np.reshape(stated, (len(stated), *signals.shape))
+
+    def _in_common(self, common: FloatArray, noise: Noise, shared: FloatArray) -> FloatArray:
+        """What readings of a press that share their errors tell less, by Woodbury's identity."""
+        weight = self.presses.keep / noise.own[:, None]
+        inner = np.einsum("amt,bmt,mt->tab", common, common, weight) + np.eye(len(common))
+        root = np.linalg.cholesky(inner)
+        columns = np.linalg.solve(root, np.moveaxis(shared, 0, 1))
+        flat = columns.reshape(-1, shared.shape[2])
+        return flat.T @ flat
