@@ -124,6 +124,9 @@ HOOKS = {
 }
 """Function by which a room calls what stands above it, or an extension: its module."""
 
+FILES = {"memscal-array": "extensions.arrays.files"}
+"""Schema of an extension's files: the module with ``KIND``, their reader and their layout."""
+
 PUBLIC = {
     "extensions.arrays.calibrate_array": ["ArrayCalibration", "calibrate_array"],
     "extensions.arrays.contacts": ["Contacts"],

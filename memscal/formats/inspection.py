@@ -1,11 +1,12 @@
 """Contents of a file, and its checks step by step: for ``memscal inspect`` and ``check``."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
 
 from memscal.errors import FormatError, MemscalError
+from memscal.extensions import FILES, module
 from memscal.formats.artifact import artifact_from
 from memscal.formats.digest import altered, has_no_digest, require_schema
 from memscal.formats.files import FilePath
@@ -20,12 +21,9 @@ from memscal.model import records
 from memscal.model.arrays import Values, value_record
 from memscal.model.quantities import Record, estimated_quantity, record
 
-_READERS: dict[str, Callable[[SafeFile], Any]] = {
-    writer.SCAN_SCHEMA: scan_from,
-    writer.REFERENCE_SCHEMA: profile_from,
-    writer.ARTIFACT_SCHEMA: artifact_from,
-    writer.STRESS_SCHEMA: stress_from,
-}
+Kind = tuple[Callable[[SafeFile], Any], Mapping[str, Record]]
+"""Reader of a kind of file, and its records by their paths, in the order of their listing."""
+
 _MEASURED_ON = {
     "/entry/indenter": records.INDENTER,
     "/entry/sample/film": records.FILM,
@@ -35,48 +33,59 @@ _MEASURED_ON = {
     "/entry/instrument/stage": records.STAGE,
     "/entry/user": records.USER,
 }
-# The records of each kind of file by their paths, in the order in which they are listed.
-_LAYOUTS: dict[str, dict[str, Record]] = {
-    writer.SCAN_SCHEMA: {
-        "/entry": records.EXPERIMENT,
-        "/entry/data": record(
-            "NXdata", *records.SCAN_DATA.quantities, *records.TAKEN_FOR_GRANTED.quantities
-        ),
-        "/entry/noise_record": records.SCAN_DATA,
-        "/entry/reference": records.REFERENCE_DATA,
-        **_MEASURED_ON,
-        "/entry/synthetic": records.SYNTHETIC,
-    },
-    writer.REFERENCE_SCHEMA: {
-        "/entry/reference": records.REFERENCE_DATA,
-        "/entry/parameters": records.CONTACT,
-        "/entry/parameters/indenter": records.INDENTER,
-        "/entry/parameters/film": records.FILM,
-        "/entry/process/numerics": records.NUMERICS,
-        "/entry/process": record(
-            "NXprocess", *records.PROFILE_NOTES.quantities, *records.SOLVER.quantities
-        ),
-    },
-    writer.ARTIFACT_SCHEMA: {
-        "/entry": records.TIMES,
-        "/entry/apparatus_function": records.FIELD,
-        "/entry/radial_profile": records.RADIAL_VERSION_1_0,
-        "/entry/radial_covariance": records.RADIAL_COVARIANCE,
-        "/entry/kernel_changes": records.KERNEL_CHANGES,
-        "/entry/shared_effects": records.SHARED_EFFECTS,
-        "/entry/radial_profile_bayesian": records.RADIAL,
-        "/entry/radial_profile_division": records.RADIAL,
-        "/entry/transfer_function": records.TRANSFER,
-        "/entry/reconvolution": records.RECONVOLUTION,
-        "/entry/reference": records.REFERENCE_DATA,
-        **_MEASURED_ON,
-        "/entry/process": records.PROCESS,
-    },
-    writer.STRESS_SCHEMA: {
-        **_MEASURED_ON,
-        "/entry/sensor": records.CONVERSION,
-        "/entry/process": records.PROCESS,
-    },
+_KINDS: dict[str, Kind] = {
+    writer.SCAN_SCHEMA: (
+        scan_from,
+        {
+            "/entry": records.EXPERIMENT,
+            "/entry/data": record(
+                "NXdata", *records.SCAN_DATA.quantities, *records.TAKEN_FOR_GRANTED.quantities
+            ),
+            "/entry/noise_record": records.SCAN_DATA,
+            "/entry/reference": records.REFERENCE_DATA,
+            **_MEASURED_ON,
+            "/entry/synthetic": records.SYNTHETIC,
+        },
+    ),
+    writer.REFERENCE_SCHEMA: (
+        profile_from,
+        {
+            "/entry/reference": records.REFERENCE_DATA,
+            "/entry/parameters": records.CONTACT,
+            "/entry/parameters/indenter": records.INDENTER,
+            "/entry/parameters/film": records.FILM,
+            "/entry/process/numerics": records.NUMERICS,
+            "/entry/process": record(
+                "NXprocess", *records.PROFILE_NOTES.quantities, *records.SOLVER.quantities
+            ),
+        },
+    ),
+    writer.ARTIFACT_SCHEMA: (
+        artifact_from,
+        {
+            "/entry": records.TIMES,
+            "/entry/apparatus_function": records.FIELD,
+            "/entry/radial_profile": records.RADIAL_VERSION_1_0,
+            "/entry/radial_covariance": records.RADIAL_COVARIANCE,
+            "/entry/kernel_changes": records.KERNEL_CHANGES,
+            "/entry/shared_effects": records.SHARED_EFFECTS,
+            "/entry/radial_profile_bayesian": records.RADIAL,
+            "/entry/radial_profile_division": records.RADIAL,
+            "/entry/transfer_function": records.TRANSFER,
+            "/entry/reconvolution": records.RECONVOLUTION,
+            "/entry/reference": records.REFERENCE_DATA,
+            **_MEASURED_ON,
+            "/entry/process": records.PROCESS,
+        },
+    ),
+    writer.STRESS_SCHEMA: (
+        stress_from,
+        {
+            **_MEASURED_ON,
+            "/entry/sensor": records.CONVERSION,
+            "/entry/process": records.PROCESS,
+        },
+    ),
 }
 
 
@@ -94,7 +103,7 @@ def describe(path: FilePath, *, accept_altered: bool = False) -> Values:
     with open_hdf5(path, accept_altered=accept_altered) as file:
         schema = _schema(file)
         version = require_schema(file, schema)
-        _READERS[schema](file)
+        _kind(schema)[0](file)
         quantities = []
         arrays = []
         provenance = []
@@ -150,7 +159,7 @@ def check(path: FilePath) -> list[Finding]:
             if not findings[-1].passed:
                 return findings
             step = "content"
-            _READERS[schema](file)
+            _kind(schema)[0](file)
             findings.append(Finding(step, True, "Complete, with units of the right dimension."))
     except MemscalError as error:
         findings.append(Finding(step, False, str(error)))
@@ -169,20 +178,25 @@ def _digest(file: SafeFile) -> Finding:
 
 def _schema(file: SafeFile) -> str:
     schema = file.attribute("/", writer.SCHEMA_ATTRIBUTE)
-    if isinstance(schema, str) and schema in _READERS:
-        return schema
+    known = [*_KINDS, *FILES]
+    if schema in known:
+        return str(schema)
     raise FormatError(
         f"{file.name} is not a file of memscal.",
         why=f"Its root attribute {writer.SCHEMA_ATTRIBUTE} is {schema!r}, not one of "
-        f"{', '.join(_READERS)}.",
+        f"{', '.join(known)}.",
         cure="Convert a table with `memscal import`.",
     )
+
+
+def _kind(schema: str) -> Kind:
+    return _KINDS.get(schema) or module(FILES[schema]).KIND
 
 
 def _layout(file: SafeFile, schema: str) -> Iterator[tuple[str, Record]]:
     names = file.text_list("/entry/parameters/names")
     yield "/entry/parameters", record("NXcollection", *map(estimated_quantity, names))
-    yield from _LAYOUTS[schema].items()
+    yield from _kind(schema)[1].items()
     for path in profile_paths(file):
         yield path, records.STRESS_NUMBERS
         yield path, records.STRESS_PROFILE

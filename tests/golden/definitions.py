@@ -10,6 +10,7 @@ from pathlib import Path
 from xml.etree import ElementTree as ET
 
 import memscal
+from memscal.extensions.arrays.files import RECORDS
 from memscal.formats.hdf5 import writer
 from memscal.model import records
 from memscal.model.quantities import Quantity, Record, record
@@ -112,6 +113,18 @@ DEFINITIONS: Mapping[str, tuple[str, Mapping[str, Record], tuple[str, ...]]] = {
         },
         ("", "sensor", "scans", "inputs", "quality", "process"),
     ),
+    writer.ARRAY_SCHEMA: (
+        "The apparatus functions of sensors under one film, and their crosstalk.",
+        {
+            **RECORDS,
+            "quality": _ANYTHING,
+            "indenter": records.INDENTER,
+            "sample": records.SAMPLE,
+            "sample/film": records.FILM,
+            "process": records.PROCESS,
+        },
+        (*RECORDS, "quality", "indenter", "sample", "process"),
+    ),
 }
 
 
@@ -168,7 +181,7 @@ def _group(made: dict[str | None, ET.Element], path: str, of: Record, *, needed:
         _quantity(group, quantity, optional=some or not quantity.required)
     if of.nx_class in ("NXsample", "NXsensor", "NXpositioner"):
         _field(group, "depends_on", "NX_CHAR")
-    if of in (records.KERNEL_CHANGES, records.SHARED_EFFECTS):
+    if of in (records.KERNEL_CHANGES, records.SHARED_EFFECTS, RECORDS["roots"]):
         _field(group, "names", "NX_CHAR")
     if of is _NOTE:
         _field(group, "data", "NX_CHAR")

@@ -19,12 +19,16 @@ from functools import cached_property
 
 import numpy as np
 
+from memscal.axisymmetry.kernels import gaussian_transfer_slope
 from memscal.model.arrays import (
+    TINY,
     BoolArray,
     FloatArray,
     IndexArray,
+    Values,
     array_record,
     keyword_array_record,
+    same_content,
 )
 from memscal.model.checks import Checked, QualityCheck
 from memscal.model.film import ElasticFilm
@@ -80,6 +84,7 @@ class ArrayData(Checked):
     load: float  # nominal, of the scan, in N
     readings: ArrayReadings
     kernel: str = "common"
+    baseline_uncertainties: FloatArray | None = None  # (n,): in V
     line_y: float = 0.0  # of a single line, which passes the sensors at this y, in m
     layout: FloatArray | None = None
     layout_uncertainty: float | None = None
@@ -89,6 +94,17 @@ class ArrayData(Checked):
     checks: tuple[QualityCheck, ...] = ()
     failing: Mapping[str, tuple[str, ...]] = field(default_factory=dict)  # sensors, by check
     process: Process
+
+    def stated(self) -> Values:
+        """Return its fields by their names, without what follows from them."""
+        return {name: getattr(self, name) for name in ArrayData.__dataclass_fields__}
+
+    def __eq__(self, other: object) -> bool:
+        """Whether another array has the same content."""
+        return isinstance(other, ArrayData) and same_content(self.stated(), other.stated())
+
+    # Arrays have no hash; object's own is declared as a method.
+    __hash__ = None  # type: ignore[assignment]
 
     @property
     def pairs(self) -> IndexArray:
@@ -110,11 +126,48 @@ class ArrayData(Checked):
     def covariance(self) -> FloatArray:
         """Covariance of the conversion constants by all sources, (n, n), in (V/Pa)^2."""
         n = len(self.sensors)
-        columns = np.column_stack([self.root, *self.effects.values()])[:n]
-        columns = self.conversion_constants[:, None] * columns
+        columns = self.conversion_constants[:, None] * self.columns[:n]
         return np.asarray(columns @ columns.T)
+
+    @cached_property
+    def columns(self) -> FloatArray:
+        """Root of the covariance of the parameters by all sources, (p, c)."""
+        return np.column_stack([self.root, *self.effects.values()])
+
+    def split(self, rows: FloatArray) -> list[FloatArray]:
+        """Return rows of the parameters as those of ln A, of x, of y, of c and of the modes."""
+        n = len(self.sensors)
+        return np.split(rows, [n, 2 * n, 3 * n, 3 * n + len(self.pairs)])
 
     def uncertainties(self) -> FloatArray:
         """Standard uncertainty of each parameter by all sources, (p,)."""
-        columns = np.column_stack([self.root, *self.effects.values()])
-        return np.sqrt(np.sum(columns**2, axis=1))
+        return np.asarray(np.linalg.norm(self.columns, axis=1))
+
+    @property
+    def centre_uncertainties(self) -> FloatArray:
+        """Standard uncertainties of the centres, (n, 2), in m; NaN where a centre is not known."""
+        errors = np.column_stack(self.split(self.uncertainties())[1:3])
+        return np.where(np.isnan(self.centres), np.nan, errors)
+
+    @property
+    def crosstalk_uncertainties(self) -> FloatArray:
+        """Standard uncertainties of the crosstalk, (n, n); 0 where a pair is not estimated."""
+        errors = np.zeros_like(self.crosstalk)
+        errors[self.estimated] = self.split(self.uncertainties())[3]
+        return errors
+
+    @property
+    def sigma_uncertainties(self) -> FloatArray:
+        """Standard uncertainties of the widths of the Gaussians nearest to each G, (n,), in m."""
+        # Nearest in the plane: by Parseval's theorem the squares of transforms count by k dk.
+        area = self.k * np.gradient(self.k)
+        slopes = np.array(
+            [gaussian_transfer_slope(self.k, sigma) for sigma in self.gaussian_sigmas]
+        )
+        slopes = np.nan_to_num(slopes)
+        size = np.sum(area * slopes**2, axis=1)
+        by_mode = (area * slopes) @ self.modes.changes.T / np.maximum(size, TINY)[:, None]
+        owners = np.arange(len(self.sensors))[:, None]
+        by_mode = np.where((self.modes.owner == ALL) | (self.modes.owner == owners), by_mode, 0.0)
+        errors = np.linalg.norm(by_mode @ self.split(self.columns)[4], axis=1)
+        return np.where(self.used, errors, np.nan)

@@ -25,9 +25,10 @@ SCAN_SCHEMA = "memscal-scan"
 REFERENCE_SCHEMA = "memscal-reference"
 ARTIFACT_SCHEMA = "memscal-artifact"
 STRESS_SCHEMA = "memscal-stress"
+ARRAY_SCHEMA = "memscal-array"
 SCHEMA_VERSION = "1.2.0"
 #: Those with an application definition, in ``formats/definitions``.
-DEFINED = (SCAN_SCHEMA, REFERENCE_SCHEMA, ARTIFACT_SCHEMA, STRESS_SCHEMA)
+DEFINED = (SCAN_SCHEMA, REFERENCE_SCHEMA, ARTIFACT_SCHEMA, STRESS_SCHEMA, ARRAY_SCHEMA)
 
 SCHEMA_ATTRIBUTE = "memscal_schema"
 VERSION_ATTRIBUTE = "memscal_schema_version"

@@ -1,0 +1,144 @@
+"""memscal-array: an array of sensors with all that it rests on, as HDF5.
+
+The records of its groups stand in ``files.toml``.
+"""
+
+import tomllib
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from memscal.axisymmetry.hankel import hankel_transform
+from memscal.errors import FormatError
+from memscal.extensions.arrays.array_data import ArrayData, ArrayReadings, KernelModes
+from memscal.formats import groups
+from memscal.formats.digest import require_schema, require_unaltered
+from memscal.formats.files import FilePath
+from memscal.formats.groups import read_record, write_record
+from memscal.formats.hdf5.reader import SafeFile
+from memscal.formats.hdf5.writer import ARRAY_SCHEMA, Group, Nodes, file_tree, to_json, write_tree
+from memscal.formats.units import reading_of
+from memscal.model import records
+from memscal.model.arrays import Values
+from memscal.model.indenter import Rod
+from memscal.model.quantities import Quantity, Record, record
+
+#: Radii in widths of the widest G at which G is written, for people.
+_RADII = np.linspace(0.0, 8.0, 161)
+_U_ZZ = "/entry/reconvolution/u_zz"
+
+
+def _declared(nx_class: str, signal: str, quantities: list[Values]) -> Record:
+    rows = [Quantity(**{**row, "axes": tuple(row.get("axes", ()))}) for row in quantities]
+    return record(nx_class, *rows, signal=signal)
+
+
+_TABLES = tomllib.loads(Path(__file__).with_name("files.toml").read_text(encoding="utf-8"))
+RECORDS = {name: _declared(**table) for name, table in _TABLES.items()}
+"""Records of the groups of the file, by their names."""
+
+_PARTS = [quantity.name for quantity in RECORDS["roots"].quantities]
+
+
+def write_array(data: ArrayData, path: FilePath, *, overwrite: bool = False) -> None:
+    """Write an array as a memscal-array file; the same data, the same bytes."""
+    stated = _stated(data)
+    film = write_record(records.FILM, data.film)
+    children: Nodes = {
+        "title": f"Array of {len(data.sensors)} sensors",
+        **{name: write_record(of.read_in(data.reading), stated) for name, of in RECORDS.items()},
+        "quality": groups.quality_group(data.checks),
+        "sample": Group("NXsample", {"film": film, "depends_on": "."}),
+        "indenter": groups.indenter_group(data.indenter, data),
+        "process": write_record(records.PROCESS, data.process),
+    }
+    names = to_json(list(data.effects))
+    children["roots"] = write_record(RECORDS["roots"], stated, names=names)
+    entry = Group("NXentry", children, {"default": "sensors"})
+    write_tree(file_tree(ARRAY_SCHEMA, entry), path, overwrite=overwrite)
+
+
+def _stated(data: ArrayData) -> Values:
+    """Return what the groups hold, by the names of their records."""
+    deviation = np.sqrt(np.diag(data.noise))
+    scale = np.outer(deviation, deviation)
+    radii = _RADII * np.nanmax(data.gaussian_sigmas)
+    stated = {
+        **data.stated(),
+        **vars(data.modes),
+        **vars(data.readings),
+        **dict(zip(_PARTS, data.split(data.columns), strict=True)),
+        "names": to_json(data.sensors),
+        "reference_unit": data.reading.per,
+        "conversion_constants_uncertainty": np.sqrt(np.diag(data.covariance)),
+        "gaussian_sigma_errors": data.sigma_uncertainties,
+        "c_errors": data.crosstalk_uncertainties,
+        "deviation": deviation,
+        "correlation": np.divide(data.noise, scale, out=np.zeros_like(scale), where=scale != 0),
+        "r": radii,
+        "g": hankel_transform(data.k, np.nan_to_num(data.kernels).T, radii).T / (2 * np.pi) ** 2,
+    }
+    stated["centre_x"], stated["centre_y"] = data.centres.T
+    stated["centre_x_errors"], stated["centre_y_errors"] = data.centre_uncertainties.T
+    if data.layout is not None:
+        stated["layout_x"], stated["layout_y"] = data.layout.T
+    return stated
+
+
+def array_from(file: SafeFile) -> ArrayData:
+    """Read the array of an open memscal-array file; refuse one that was changed."""
+    require_schema(file, ARRAY_SCHEMA)
+    require_unaltered(file)
+    reading = reading_of(file.units_of(_U_ZZ) or "V", file.where(_U_ZZ))
+    names = tuple(file.text_list("/entry/sensors/names"))
+    sizes = {"sensor": len(names)}
+    read: Values = {}
+    for group, of in RECORDS.items():
+        read |= read_record(of.read_in(reading), file, f"/entry/{group}", sizes=sizes)
+    effects = file.text_list("/entry/roots/names")
+    columns = np.vstack([read[part] for part in _PARTS])
+    root, *changes = np.split(columns, range(-len(effects), 0), axis=1)
+    if "layout_x" in read:
+        read["layout"] = np.column_stack([read["layout_x"], read["layout_y"]])
+    scale = np.outer(read["deviation"], read["deviation"])
+    read |= {
+        "sensors": names,
+        "used": read["used"] > 0,
+        "centres": np.column_stack([read["centre_x"], read["centre_y"]]),
+        "estimated": read["estimated"] > 0,
+        "noise": read["correlation"] * scale,
+        "modes": KernelModes(read["changes"], read["owner"].astype(np.intp)),
+        "root": root,
+        "effects": {name: of[:, 0] for name, of in zip(effects, changes, strict=True)},
+        "film": groups.read_film(file, "/entry/sample/film"),
+        "indenter": groups.read_round_indenter(file, "/entry/indenter"),
+        "readings": ArrayReadings(**{n: read[n] for n in ArrayReadings.__dataclass_fields__}),
+        "load": file.require_scalar("/entry/indenter/load", "force"),
+        "reading": replace(reading, per=read["reference_unit"]),
+        "checks": groups.read_quality(file),
+        "failing": {check: tuple(of) for check, of in read["failing"].items()},
+        "process": groups.read_process(file),
+    }
+    data = ArrayData(**{n: read[n] for n in read.keys() & ArrayData.__dataclass_fields__.keys()})
+    parameters = 3 * len(names) + len(data.pairs) + len(data.modes.owner)
+    if len(columns) != parameters or not isinstance(data.indenter, Rod):
+        raise FormatError(
+            f"{file.name} does not fit together: its roots have {len(columns)} rows.",
+            why=f"Its array, calibrated with a rod, has {parameters} parameters.",
+            cure="Calibrate the array again.",
+        )
+    return data
+
+
+_PATHS = {f"/entry/{name}": of for name, of in RECORDS.items()}
+KIND = (
+    array_from,
+    {
+        **_PATHS,
+        "/entry/indenter": records.INDENTER,
+        "/entry/sample/film": records.FILM,
+        "/entry/process": records.PROCESS,
+    },
+)
+"""Reader and layout of the file, for ``memscal check`` and ``memscal inspect``."""

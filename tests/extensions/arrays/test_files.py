@@ -1,0 +1,147 @@
+"""The array's file: what is stored comes back, other programs read it, and changes are refused."""
+
+from dataclasses import replace
+
+import h5py
+import numpy as np
+import pytest
+from helpers.arrays import SIGMA, A, known_array
+from helpers.digests import rewrite_digest
+
+import memscal
+from memscal.axisymmetry.kernels import gaussian_transfer_slope, unit_gaussian
+from memscal.errors import FormatError, OutputError
+from memscal.extensions.arrays.array_data import ALL, ArrayReadings, KernelModes
+from memscal.formats.inspection import check, describe
+from memscal.model.checks import QualityCheck
+from memscal.model.notation import Reading
+
+
+def full_array(rows=2, columns=3, *, points=50, seed=0, **changes):
+    """Return an array that states everything, with one dead sensor."""
+    rng = np.random.default_rng(seed)
+    array = known_array(rows, columns)
+    n = rows * columns
+    used = np.arange(n) != n - 1
+    # One width of all, and one of the first sensor's own.
+    slope = SIGMA * gaussian_transfer_slope(array.k, SIGMA)
+    modes = KernelModes(np.stack([slope, slope / 2]), np.array([ALL, 0]))
+    parameters = 3 * n + len(array.pairs) + 2
+    place = rng.uniform(-5e-3, 5e-3, (2, points))
+    u = rng.normal(scale=1e-3, size=(3, n, points))
+    stated = {
+        "used": used,
+        "conversion_constants": np.where(used, array.conversion_constants, np.nan),
+        "modes": modes,
+        "root": 1e-3 * rng.normal(size=(parameters, 7)),
+        "effects": {"load": np.full(parameters, -0.01), "thickness": rng.normal(size=parameters)},
+        "readings": ArrayReadings(*place, np.ones(points), *u),
+        "noise": 1e-12 * (np.eye(n) + 0.5),
+        "baseline_uncertainties": np.full(n, 1e-5),
+        "layout": array.centres + 1e-5,
+        "layout_uncertainty": 2e-5,
+        "reading_high": np.full(n, 1.0),
+        "checks": (QualityCheck("dead_taxels", 1.0, 0.0, False, "One is dead."),),
+        "failing": {"dead_taxels": ("T05",)},
+    }
+    return replace(array, **(stated | changes))
+
+
+@pytest.mark.parametrize("own", [False, True])
+def test_what_is_stored_comes_back(tmp_path, own):
+    array = full_array()
+    if own:
+        kernels = array.kernels * np.linspace(1.0, 0.9, 6)[:, None]
+        array = replace(array, kernel="own", kernels=kernels)
+    array.save(tmp_path / "array.h5")
+    found = memscal.load_array(tmp_path / "array.h5")
+    for name in ("centres", "crosstalk", "covariance", "noise", "root", "k", "kernels", "layout"):
+        expected = getattr(array, name)
+        np.testing.assert_allclose(getattr(found, name), expected, rtol=1e-14, err_msg=name)
+    for name in ("sensors", "failing", "checks", "kernel", "process", "reading"):
+        assert getattr(found, name) == getattr(array, name), name
+    np.testing.assert_allclose(found.readings.u, array.readings.u, rtol=1e-14)
+    # Units round a number once.
+    found.save(tmp_path / "again.h5")
+    assert memscal.load_array(tmp_path / "again.h5") == found
+    assert found.source.file_name == "array.h5"
+    assert replace(found, load=2.0) != found
+
+
+def test_others_find_numbers_with_their_uncertainties_and_units(tmp_path):
+    array = full_array(layout=None)
+    array.save(tmp_path / "array.h5")
+    with h5py.File(tmp_path / "array.h5") as file:
+        sensors = file["entry/sensors"]
+        assert sensors.attrs["signal"] == "conversion_constant"
+        assert sensors["conversion_constant"].attrs["units"] == "mV/Pa"
+        assert sensors["conversion_constant"][0] == pytest.approx(1e3 * A)
+        # The load's and the others' shares, added by hand.
+        columns = np.column_stack([array.root, *array.effects.values()])
+        errors = 1e3 * A * np.sqrt(np.sum(columns[0] ** 2))
+        assert sensors["conversion_constant_errors"][0] == pytest.approx(errors)
+        assert np.isnan(sensors["conversion_constant"][5])
+        assert sensors["used"][:].tolist() == [1, 1, 1, 1, 1, 0]
+        # A mode that widens G by one part in one has the width's uncertainty.
+        both = columns[-2] + columns[-1] / 2
+        widths = sensors["gaussian_sigma_errors"][:2] / (1e3 * SIGMA)
+        assert widths == pytest.approx([np.linalg.norm(both), np.linalg.norm(columns[-2])])
+        crosstalk = file["entry/crosstalk"]
+        row, column = array.pairs[3]
+        error = np.linalg.norm(columns[18 + 3])
+        assert crosstalk["c_errors"][row, column] == pytest.approx(error)
+        assert crosstalk["c_errors"][0, 0] == 0.0
+        r, g = file["entry/kernel/r"][:], file["entry/kernel/g"][0]
+        expected = 1e-6 * unit_gaussian(1e-3 * r, SIGMA)
+        np.testing.assert_allclose(g, expected, atol=1e-6 * expected[0])
+
+
+def test_readings_in_other_units_keep_them(tmp_path):
+    counts = replace(full_array(), reading=Reading("1", 0))
+    tesla = replace(full_array(), reading=Reading("T", -6))
+    for name, array in (("counts", counts), ("tesla", tesla)):
+        array.save(tmp_path / f"{name}.h5")
+        found = memscal.load_array(tmp_path / f"{name}.h5")
+        assert found.reading == array.reading
+        np.testing.assert_allclose(found.noise, array.noise, rtol=1e-12)
+        np.testing.assert_allclose(found.baseline_uncertainties, 1e-5, rtol=1e-14)
+
+
+def test_a_changed_file_is_refused_or_accepted_on_record(tmp_path):
+    path = tmp_path / "array.h5"
+    full_array().save(path)
+    assert all(finding.passed for finding in check(path))
+    assert describe(path)["checks"][0]["name"] == "dead_taxels"
+    with pytest.raises(OutputError, match="exists"):
+        full_array().save(path)
+    with h5py.File(path, "a") as file:
+        file["entry/crosstalk/c"][0, 1] = 0.5
+    assert [finding.passed for finding in check(path)] == [True, True, False]
+    with pytest.raises(FormatError, match="changed after it was written"):
+        memscal.load_array(path)
+    found = memscal.load_array(path, accept_altered=True)
+    assert found.crosstalk[0, 1] == 0.5
+    assert "digest" in found.source.altered
+
+
+def test_the_artifact_of_a_single_sensor_is_refused_in_words(tmp_path):
+    memscal.calibrate(memscal.simulate(points=33)).apparatus.save(tmp_path / "one.h5")
+    with pytest.raises(FormatError) as caught:
+        memscal.load_array(tmp_path / "one.h5")
+    assert "one.h5 is the artifact of a single sensor, not of an array" in str(caught.value)
+
+
+def test_an_array_that_does_not_fit_together_is_refused(tmp_path):
+    full_array().save(tmp_path / "short.h5")
+    with h5py.File(tmp_path / "short.h5", "a") as file:
+        file["entry/crosstalk/estimated"][:] = 0
+    rewrite_digest(tmp_path / "short.h5")
+    with pytest.raises(FormatError, match="roots have"):
+        memscal.load_array(tmp_path / "short.h5")
+
+
+def test_a_raster_of_many_sensors_stays_small(tmp_path):
+    full_array(8, 8, points=4225).save(tmp_path / "array.h5")
+    # Three arrays of 64 x 4225 readings, of which noise does not shrink.
+    assert (tmp_path / "array.h5").stat().st_size < 8e6
+    assert memscal.load_array(tmp_path / "array.h5").readings.u.shape == (64, 4225)
