@@ -363,11 +363,12 @@ class Weighing:
         """Of all hypotheses, for the estimate and for its uncertainty, (2, h)."""
         return _PRIORS if self.basis.rings else np.eye(1, len(HYPOTHESES)).repeat(2, axis=0)
 
-    def average(self) -> WeighedFit:
+    def average(self, *, allowing: int = 1) -> WeighedFit:
         """Average mean and gain by one set of probabilities, squared errors by the other."""
+        # Or by the first one, too, ``allowing`` for no more departures than the estimate does.
         given = self.given
         probabilities = []
-        for prior in self.priors:
+        for prior in self.priors[[0, allowing]]:
             # Bayes' theorem; negligible probabilities are set to zero.
             held = np.where(prior > 0, self.log_marginals, -np.inf)
             weight = prior * np.exp(held - held.max())

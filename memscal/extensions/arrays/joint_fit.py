@@ -8,7 +8,7 @@ left is data and kernels of one sensor, of which the shape of G is found as that
 
     c_{ij} = m + e_{ij}, \qquad m \sim N(0,\,0.05^2), \qquad e_{ij} \sim N(0,\,t^2),
 
-averaged over t by its marginal likelihood.  A prior about zero would take a common crosstalk for a
+with t by its marginal likelihood.  A prior about zero would take a common crosstalk for a
 ring of the common G.
 """
 
@@ -16,27 +16,27 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
+from memscal.axisymmetry.hankel import RadialSpectrum
 from memscal.axisymmetry.kernels import gaussian_transfer, gaussian_transfer_slope
 from memscal.errors import FitError
 from memscal.estimation import bayesian
-from memscal.estimation.departures import SHAPES, ReducedScan, departure_basis
+from memscal.estimation.departures import ReducedScan, departure_basis
 from memscal.estimation.forward import ForwardModel
 from memscal.estimation.gaussian import GaussianFit
 from memscal.estimation.voltage_map import VoltageMap, square_root
 from memscal.extensions.arrays.joint_model import ArrayState, Information, JointModel, Layout, Noise
 from memscal.extensions.arrays.presses import Presses, Waves
-from memscal.model.arrays import ArrayPair, BoolArray, FloatArray, array_record
+from memscal.model.arrays import ArrayPair, FloatArray, array_record
 
 #: Standard deviations of crosstalk about its mean that are weighed, and that of the mean.
 SPREADS = (0.0005, 0.001, 0.002, 0.005, 0.01, 0.02, 0.05)
 WIDEST = SPREADS[-1]
-#: Those of less probability are left out.
-_NEGLIGIBLE = 1e-3
 #: Standard deviation of what is a sensor's own: ln width, and departures over the Gaussian's size.
 OWN_WIDTH = 0.05
 _OWN_SHAPE = 0.05
@@ -61,14 +61,14 @@ class ReducedArray(ReducedScan):
         """Derivatives by the reduced data: what is each sensor's own is integrated out."""
         return VoltageMap(((gain, np.eye(gain.shape[1])),))
 
-    def residual(self, basis: Any, mean: FloatArray) -> FloatArray:
+    def residual(self, basis: Any, mean: FloatArray) -> FloatArray:  # noqa: ARG002
         """Nothing: the residuals are those of the array."""
         return np.zeros(0)
 
 
 @array_record
 class Posterior:
-    """What a spread of crosstalk, or several, leave of parameters and of the common kernel."""
+    """What the readings tell of the parameters and of the common kernel, by a prior of crosstalk."""
 
     log_evidence: float
     change: FloatArray  # (p,): of the parameters
@@ -88,6 +88,12 @@ class JointFit:
     gaussian: GaussianFit
     posterior: Posterior
     widest: Posterior  # by the widest prior of the crosstalk
+    forward: ForwardModel
+
+    @property
+    def reference(self) -> RadialSpectrum:
+        """Transform of the base stress per newton."""
+        return self.forward.reference
 
     @property
     def residual(self) -> FloatArray:
@@ -257,15 +263,15 @@ def fit_array(
             posterior(model, information, state, gaussian, forward, spread)
             for spread in _spreads(model.layout)
         ]
-        averaged = average(posteriors)
-        moved = model.layout.moved(state, averaged.change, presses.axes)
-        kernel = model.waves.mix @ averaged.kernel
+        best = max(posteriors, key=attrgetter("log_evidence"))
+        moved = model.layout.moved(state, best.change, presses.axes)
+        kernel = model.waves.mix @ best.kernel
         state = replace(moved, kernel=kernel)
         noise = _noise(model, state)
-        size = np.sqrt(np.sum(averaged.root[: model.layout.count] ** 2, axis=1))
-        if np.all(abs(averaged.change) < 5 * _SETTLED * size):
+        size = np.sqrt(np.sum(best.root[: model.layout.count] ** 2, axis=1))
+        if np.all(abs(best.change) < 5 * _SETTLED * size):
             break
-    return JointFit(model, state, noise, information, gaussian, averaged, posteriors[-1])
+    return JointFit(model, state, noise, information, gaussian, best, posteriors[-1], forward)
 
 
 def _spreads(layout: Layout) -> Sequence[float]:
@@ -310,7 +316,7 @@ def posterior(
     reduced = _reduced(columns, model.waves, gaussian, forward)
     basis = departure_basis(gaussian, reduced)
     weighing = bayesian.weigh_departures(reduced, basis, count, least_noise=1.0)
-    weighed = weighing.average()
+    weighed = weighing.average(allowing=0)
     kernels = basis.kernels(forward.k)
     combined = model.waves.mix @ kernels
     # The parameters given a kernel: what they are without it, less what it explains of them.
@@ -327,7 +333,7 @@ def posterior(
     kernel_gain = weighed.gain.dense() @ columns[:, 1:]
     gain = np.vstack([by_others[:, 1:] - by_kernel @ kernel_gain, kernels @ kernel_gain])
     evidence = weighing.evidence - 0.5 * normal.log_determinant
-    places, of_crosstalk = crosstalk_precision(layout, spread)
+    _, of_crosstalk = crosstalk_precision(layout, spread)
     evidence += 0.5 * np.linalg.slogdet(of_crosstalk)[1]
     kernel = _gaussian(gaussian) + kernels @ weighed.mean
     return Posterior(float(evidence), change, kernel, root, gain)
@@ -351,21 +357,3 @@ def _reduced(
     none = np.zeros((len(columns), 0))
     weights = np.ones(len(columns))
     return ReducedArray(forward, gaussian, columns[:, 0], flat, none, weights, synthesis, None)
-
-
-def average(posteriors: Sequence[Posterior]) -> Posterior:
-    """Average posteriors by their evidence; their differences count as uncertainty."""
-    evidence = np.array([each.log_evidence for each in posteriors])
-    weight = np.exp(evidence - evidence.max())
-    weight[weight < _NEGLIGIBLE * weight.sum()] = 0.0
-    weight /= weight.sum()
-    likely = [(w, each) for w, each in zip(weight, posteriors, strict=True) if w]
-    change = sum(w * each.change for w, each in likely)
-    kernel = sum(w * each.kernel for w, each in likely)
-    mean = np.append(change, kernel)
-    columns = []
-    for w, each in likely:
-        apart = np.append(each.change, each.kernel) - mean
-        columns += [np.sqrt(w) * each.root, np.sqrt(w) * apart[:, None]]
-    gain = sum(w * each.gain for w, each in likely)
-    return Posterior(float(evidence.max()), change, kernel, np.hstack(columns), gain)

@@ -115,7 +115,12 @@ class JointModel:
     presses: Presses
     waves: Waves
     layout: Layout
-    own: FloatArray  # (f, o): changes of a sensor's own kernel
+    own_kernels: FloatArray  # (nodes, o): transforms of changes of a sensor's own kernel, in V/Pa
+
+    @property
+    def own(self) -> FloatArray:
+        """These changes by their combinations of the waves, (f, o)."""
+        return self.waves.mix @ self.own_kernels
 
     def distances(self, state: ArrayState) -> tuple[FloatArray, FloatArray]:
         """Distances of the presses from each centre, (m, t), and their slopes by it, (2, m, t)."""
@@ -126,7 +131,8 @@ class JointModel:
     def signals(self, state: ArrayState) -> tuple[FloatArray, FloatArray]:
         """What each sensor would read without crosstalk, (m, t), and its slope by the distance."""
         radius, _ = self.distances(state)
-        kernels = state.kernel[:, None] + self.own @ state.own.T
+        own = self.own @ state.own.T
+        kernels = state.kernel[:, None] + own
         signals = np.empty(radius.shape)
         slopes = np.empty(radius.shape)
         common = not state.own.any()

@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from memscal.axisymmetry.hankel import RadialSpectrum, bessel_table, radial_spline
+from memscal.estimation.points import agreeing_tops
 from memscal.model.arrays import ArrayFunction, BoolArray, FloatArray, IndexArray, array_record
+from memscal.model.scan import Scan
 
 #: Phase (rad) of the last wavenumber from one radius of a table to the next.
 _PHASE = 0.25
@@ -51,3 +53,68 @@ class Waves:
     def profiles(self, columns: FloatArray) -> ArrayFunction:
         """Functions of the distance (m), (q,) each, of combinations (f, q); a cubic spline."""
         return radial_spline(self.radii, self.values @ columns)
+
+
+#: A sensor whose peak is below so many times the noise of its outermost readings is dead.
+_DEAD = 8.0
+#: The outermost readings are this share of all, the highest three stand for the peak.
+_OUTERMOST = 0.1
+_FEWEST = 10
+#: The highest readings are at a ceiling if so many agree to such a share of the noise: readings to
+#: many digits, and to few.
+_CLIPPED = ((3, 0.02), (6, 0.2))
+
+
+@array_record
+class Sorted:
+    """Which readings (n, t) of an array count, and which of its n sensors."""
+
+    keep: BoolArray
+    used: BoolArray
+    dead: BoolArray
+    at_ceiling: IndexArray  # (n,): how many readings
+    peak: FloatArray  # (n,): over the baseline, in V
+    baseline: FloatArray  # (n,)
+    noise: FloatArray  # (n,): of the outermost readings
+
+
+def sorted_readings(scan: Scan, places: FloatArray, u: FloatArray) -> Sorted:
+    """Find dead sensors and readings at a ceiling, as stated or as they agree, of u (n, t)."""
+    n = len(u)
+    keep = np.isfinite(u)
+    numbers = np.zeros((3, n))
+    at_ceiling = np.zeros(n, np.intp)
+    low = -np.inf if scan.reading_low is None else scan.reading_low
+    high = np.inf if scan.reading_high is None else scan.reading_high
+    keep &= (u > np.reshape(low, (-1, 1))) & (u < np.reshape(high, (-1, 1)))
+    at_ceiling += np.isfinite(u).sum(axis=1) - keep.sum(axis=1)
+    for i, row in enumerate(u):
+        inside = np.flatnonzero(keep[i])
+        if inside.size < _FEWEST:
+            continue
+        values = row[inside]
+        top = places[:, inside[np.argmax(abs(values - np.median(values)))]]
+        distance = np.hypot(*(places[:, inside] - top[:, None]))
+        count = max(int(_OUTERMOST * inside.size), _FEWEST)
+        outermost = values[np.argsort(distance)[-count:]]
+        baseline = np.median(outermost)
+        numbers[:, i] = np.sort(values)[-3] - baseline, baseline, outermost.std()
+        clipped = inside[_clipped(values, numbers[2, i])]
+        if scan.reading_high is None and clipped.size:
+            keep[i, clipped] = False
+            at_ceiling[i] += clipped.size
+    peak, baseline, noise = numbers
+    stated = np.ones(n, bool) if scan.used is None else scan.used
+    dead = stated & (peak <= _DEAD * noise)
+    used = stated & ~dead
+    return Sorted(keep & used[:, None], used, dead, at_ceiling * used, peak, baseline, noise)
+
+
+def _clipped(u: FloatArray, noise: float) -> IndexArray:
+    """Numbers of the highest readings (n,), if they agree as no noise has them."""
+    falling, counts, apart = agreeing_tops(u)
+    for fewest, share in _CLIPPED:
+        alike = counts[(counts >= fewest) & (apart[counts - 1] <= share * noise)]
+        if alike.size:
+            return falling[: alike.max()]
+    return falling[:0]

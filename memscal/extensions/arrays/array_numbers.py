@@ -1,0 +1,101 @@
+"""Numbers of an array from its joint fit: A, centres and crosstalk, shapes, and their errors."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from memscal.extensions.arrays.array_data import ALL, KernelModes
+from memscal.extensions.arrays.joint_fit import JointFit, Posterior
+from memscal.model.arrays import Arrays, BoolArray, FloatArray, array_record
+
+#: Modes of the kernel of less than this share of the largest are nothing, and no more than so many.
+_SMALLEST = 1e-3
+_MOST_MODES = 12
+
+
+@array_record
+class ArrayNumbers:
+    """Numbers of m sensors by a fit; columns are roots of covariances, or effects of inputs."""
+
+    log_a: FloatArray  # (m,)
+    of_a: FloatArray  # (m, c)
+    of_centres: FloatArray  # (2, m, c)
+    of_crosstalk: FloatArray  # (m, m, c)
+    kernels: FloatArray  # (1 or m, nodes): transforms of G
+    of_kernels: FloatArray  # (1 or m, nodes, c)
+
+
+def array_numbers(fit: JointFit, posterior: Posterior, columns: FloatArray) -> ArrayNumbers:
+    """Return the numbers of a fit, and of columns (p + nodes, c) their changes."""
+    model = fit.model
+    layout = model.layout
+    wavenumbers = fit.reference.wavenumbers
+    m = len(fit.state.gain)
+    own = model.own_kernels @ fit.state.own.T
+    # Of equal kernels one stands for all.
+    shown = own if layout.own.size else own[:, :1]
+    kernels = (posterior.kernel[:, None] + shown).T
+    changes = np.repeat(columns[None, layout.count :], len(kernels), axis=0)
+    for j, places in enumerate(layout.own):
+        changes[j % len(kernels)] += model.own_kernels @ columns[places]
+    total = wavenumbers.integrals(kernels.T)
+    of_total = wavenumbers.integrals(np.moveaxis(changes, 0, 1)) / total[:, None]
+    gains = np.where((layout.gains < 0)[:, None], 0.0, columns[layout.gains])
+    centres = np.zeros((2, m, columns.shape[1]))
+    centres[list(model.presses.axes)] = columns[layout.centres]
+    estimated = layout.crosstalk >= 0
+    crosstalk = np.where(estimated[:, :, None], columns[layout.crosstalk], 0.0)
+    transfer = kernels / total[:, None]
+    of_transfer = changes / total[:, None, None] - transfer[:, :, None] * of_total[:, None]
+    return ArrayNumbers(
+        np.log(fit.state.gain) + np.log(total), gains + of_total, centres, crosstalk, transfer,
+        of_transfer,
+    )
+
+
+def kernel_modes(fit: JointFit, numbers: ArrayNumbers) -> tuple[KernelModes, FloatArray]:
+    """Return what is open of the shapes of G as few modes, and their columns (modes, c)."""
+    reference = fit.reference
+    seen = np.sqrt(reference.wavenumbers.weights) * abs(reference.values)
+    seen = seen / seen.max() + 1e-6
+    changes = []
+    owners = []
+    sizes = []
+    alike = len(numbers.kernels) == 1
+    for j, change in enumerate(numbers.of_kernels):
+        left, size, right = np.linalg.svd(seen[:, None] * change, full_matrices=False)
+        count = min(_MOST_MODES, int(np.sum(size > _SMALLEST * size[0])))
+        changes.append((left[:, :count] / seen[:, None] * size[0]).T)
+        sizes.append(size[:count, None] / size[0] * right[:count])
+        owners += [ALL if alike else j] * count
+    return KernelModes(np.vstack(changes), np.array(owners)), np.vstack(sizes)
+
+
+def stacked(numbers: ArrayNumbers, estimated: BoolArray, modes: FloatArray) -> FloatArray:
+    """Return columns of all parameters of an array, (p, c), in their order."""
+    parts = [numbers.of_a, *numbers.of_centres, numbers.of_crosstalk[estimated], modes]
+    return np.vstack(parts)
+
+
+def of_all_sensors(columns: FloatArray, used: BoolArray, estimated: BoolArray) -> FloatArray:
+    """Spread columns of the used sensors' parameters to those of all, with zeros between."""
+    m = used.sum()
+    n = used.size
+    spread = np.zeros((3 * n + len(columns) - 3 * m, columns.shape[1]))
+    places = np.flatnonzero(np.tile(used, 3))
+    spread[places] = columns[: 3 * m]
+    spread[3 * n :] = columns[3 * m :]
+    return spread
+
+
+def input_columns(fit: JointFit, changes: Mapping[str, FloatArray]) -> Arrays:
+    """Return what inputs that change the reference (nodes,) do to the posterior, by their names."""
+    reference = fit.reference.values
+    effects = {}
+    for name, change in changes.items():
+        # The change of the stress acts as one of the kernel.
+        ratio = np.divide(change, reference, out=np.zeros_like(change), where=reference != 0)
+        effects[name] = -fit.posterior.gain @ (fit.model.waves.mix @ (ratio * fit.posterior.kernel))
+    return effects
