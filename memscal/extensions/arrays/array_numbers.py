@@ -50,7 +50,11 @@ def array_numbers(fit: JointFit, posterior: Posterior, columns: FloatArray) -> A
     transfer = kernels / total[:, None]
     of_transfer = changes / total[:, None, None] - transfer[:, :, None] * of_total[:, None]
     return ArrayNumbers(
-        np.log(fit.state.gain) + np.log(total), gains + of_total, centres, crosstalk, transfer,
+        np.log(fit.state.gain) + np.log(total),
+        gains + of_total,
+        centres,
+        crosstalk,
+        transfer,
         of_transfer,
     )
 
@@ -79,7 +83,7 @@ def stacked(numbers: ArrayNumbers, estimated: BoolArray, modes: FloatArray) -> F
     return np.vstack(parts)
 
 
-def of_all_sensors(columns: FloatArray, used: BoolArray, estimated: BoolArray) -> FloatArray:
+def of_all_sensors(columns: FloatArray, used: BoolArray) -> FloatArray:
     """Spread columns of the used sensors' parameters to those of all, with zeros between."""
     m = used.sum()
     n = used.size
@@ -90,12 +94,12 @@ def of_all_sensors(columns: FloatArray, used: BoolArray, estimated: BoolArray) -
     return spread
 
 
-def input_columns(fit: JointFit, changes: Mapping[str, FloatArray]) -> Arrays:
-    """Return what inputs that change the reference (nodes,) do to the posterior, by their names."""
+def input_columns(fit: JointFit, products: Mapping[str, FloatArray]) -> Arrays:
+    """Return what changes of the kernel times the reference (nodes,) do to the posterior."""
     reference = fit.reference.values
     effects = {}
-    for name, change in changes.items():
-        # The change of the stress acts as one of the kernel.
-        ratio = np.divide(change, reference, out=np.zeros_like(change), where=reference != 0)
-        effects[name] = -fit.posterior.gain @ (fit.model.waves.mix @ (ratio * fit.posterior.kernel))
+    for name, product in products.items():
+        # A change of the stress acts as one of the kernel.
+        ratio = np.divide(product, reference, out=np.zeros_like(product), where=reference != 0)
+        effects[name] = -fit.posterior.gain @ (fit.model.waves.mix @ ratio)
     return effects

@@ -1,4 +1,4 @@
-"""Calibration of an array: from a rod scan of all its sensors to A, crosstalk and one shape of G."""
+"""Calibration of an array: from a rod scan of all its sensors to A, crosstalk and a shape of G."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from memscal.axisymmetry.kernels import gaussian_transfer
+from memscal.axisymmetry.kernels import gaussian_transfer, gaussian_transfer_slope
 from memscal.calibration.prepare import Prepared, Reference, Request, prepare
 from memscal.deconvolution.division import WhiteNoise
-from memscal.errors import FitError, InputError, counted
+from memscal.errors import FitError, InputError, counted, require_names
 from memscal.estimation.departures import SHAPES
 from memscal.estimation.forward import ForwardModel
 from memscal.estimation.gaussian import GaussianFit, fit_gaussian_to_points
@@ -22,7 +22,7 @@ from memscal.estimation.reference_spectra import (
     reference_sensitivities,
     reference_spectra,
 )
-from memscal.extensions.arrays.array_checks import array_checks, failing_messages
+from memscal.extensions.arrays.array_checks import array_checks, array_messages
 from memscal.extensions.arrays.array_data import ArrayReadings
 from memscal.extensions.arrays.array_numbers import (
     array_numbers,
@@ -31,7 +31,7 @@ from memscal.extensions.arrays.array_numbers import (
     of_all_sensors,
     stacked,
 )
-from memscal.extensions.arrays.joint_fit import JointFit, fit_array
+from memscal.extensions.arrays.joint_fit import JointFit, fit_array, fit_shape
 from memscal.extensions.arrays.joint_model import ArrayState, JointModel, Layout, Noise
 from memscal.extensions.arrays.presses import Presses, Sorted, Waves, sorted_readings
 from memscal.extensions.arrays.sensor_array import SensorArray
@@ -40,12 +40,10 @@ from memscal.model.arrays import (
     Arrays,
     BoolArray,
     FloatArray,
-    IndexArray,
     array_record,
-    require_names,
 )
-from memscal.model.checks import Checked, Message, QualityCheck
-from memscal.model.film import FilmLaw
+from memscal.model.checks import Checked, QualityCheck, failed_check_messages
+from memscal.model.film import LINEAR, FilmLaw
 from memscal.model.provenance import Process
 from memscal.model.result import Shown
 from memscal.model.scan import Scan
@@ -192,13 +190,268 @@ def calibrate_array(
         )
     strongest = singles[int(np.argmax(np.where(found.used, found.peak, -np.inf)))]
     prepared = prepare((strongest,), request)
-    begun = _begun(opened, prepared, found, places, u, _pairs(opened, found, places, u, crosstalk))
+    presses = _presses(opened, prepared, found, places, u)
+    begun = _begun(opened, prepared, found, presses, crosstalk)
     fit = fit_array(*begun)
-    other = _own_fit(fit, begun)
-    chosen, compared = _chosen(fit, other, kernel, planar=strongest.planar)
-    array = _array(opened, prepared, found, chosen, _effects(prepared, chosen))
-    checks, failing = array_checks(chosen, compared, array, found)
-    messages = [*failing_messages(checks, failing, array), *_messages(opened, prepared)]
-    process = replace(array.process, messages=tuple(messages))
-    finished = replace(array, checks=checks, failing=failing, process=process)
-    return ArrayCalibration(finished, chosen)
+    own = kernel == "own" or (kernel == "auto" and strongest.planar)
+    compared = _own_fit(fit, shapes=own)
+    if kernel == "own" or (own and compared.log_evidence > fit.log_evidence):
+        fit, compared = compared, fit
+    array = _array(opened, prepared, found, fit)
+    checks, failing = array_checks(fit, compared, array, found)
+    messages = [*failed_check_messages(checks), *array_messages(opened, prepared, found, fit)]
+    process = Process.of_now(
+        configuration={
+            "kernel": kernel,
+            "crosstalk": crosstalk if isinstance(crosstalk, str) else [*map(list, crosstalk)],
+            "film_law": film_law,
+            "rod_friction": rod_friction,
+            "override": prepared.overridden,
+        },
+        messages=tuple(messages),
+        input_scan=opened.source,
+    )
+    return ArrayCalibration(replace(array, checks=checks, failing=failing, process=process), fit)
+
+
+def _presses(
+    scan: Scan, prepared: Prepared, found: Sorted, places: FloatArray, u: FloatArray
+) -> Presses:
+    """Return the presses of all places, with the readings of the used sensors."""
+    single = prepared.scans[0]
+    if len(prepared.scans) > 1 and single.set_up.film.law != LINEAR:
+        raise InputError(
+            f"The presses have {len(prepared.scans)} loads, and the film's law is not linear.",
+            why="The stress then changes its shape with the load.",
+            cure="Press with one load, or state film_law='linear' (--film-law linear).",
+        )
+    load = scan.of_sensor(0).normal_load
+    loads = np.full(u.shape[1], single.stated_load) if load is None else load.ravel()
+    errors = np.zeros(u.shape[1])
+    if scan.normal_load_errors is not None:
+        errors = np.ravel(scan.normal_load_errors) / loads
+    used = found.used
+    keep = found.keep[used] & np.isfinite(loads)
+    x_errors = np.zeros(scan.x.size) if scan.x_errors is None else scan.x_errors
+    shape = scan.u_zz.shape[1:]
+    axes = (0, 1) if single.planar else ((0,) if single.direction == "x" else (1,))
+    drift = [np.ones(u.shape[1])]
+    for axis in axes:
+        half = np.ptp(places[axis]) / 2
+        drift.append((places[axis] - places[axis].min()) / half - 1)
+    stated = scan.u_zz_errors
+    if stated is not None:
+        stated = np.broadcast_to(stated.reshape(len(u), -1), u.shape)[used]
+    board = np.zeros(len(u), np.intp) if scan.board is None else scan.board
+    return Presses(
+        places=places,
+        load=np.where(np.isfinite(loads), loads, 0.0),
+        u=np.where(keep, u[used], 0.0),
+        keep=keep,
+        drift=np.stack(drift, axis=1),
+        axes=axes,
+        place_errors=np.broadcast_to(x_errors, shape).ravel(),
+        load_errors=np.where(np.isfinite(errors), errors, 0.0),
+        board=np.unique(board[used], return_inverse=True)[1],
+        stated=stated,
+    )
+
+
+def _pairs(
+    scan: Scan,
+    found: Sorted,
+    centres: FloatArray,
+    crosstalk: CrosstalkModel | Sequence[tuple[str, str]],
+) -> BoolArray:
+    """Return which of the used sensors read which, (m, m)."""
+    used = np.flatnonzero(found.used)
+    m = used.size
+    if not isinstance(crosstalk, str):
+        names = [scan.sensors[i] for i in used]
+        pairs = np.zeros((m, m), bool)
+        for row, column in crosstalk:
+            require_names("There is no used sensor", [row, column], names)
+            pairs[names.index(row), names.index(column)] = row != column
+        return pairs
+    require_names("There is no model of crosstalk", [crosstalk], CrosstalkModel.__args__)
+    apart = ~np.eye(m, dtype=bool)
+    if crosstalk == "full":
+        return apart
+    if crosstalk == "none" or m == 1:
+        return np.zeros((m, m), bool)
+    places = centres if scan.layout is None else scan.layout[used]
+    distance = np.hypot(*(places[:, None] - places).T)
+    return apart & (distance <= _NEIGHBOURS * distance[apart].min())
+
+
+def _begun(
+    scan: Scan,
+    prepared: Prepared,
+    found: Sorted,
+    presses: Presses,
+    crosstalk: CrosstalkModel | Sequence[tuple[str, str]],
+) -> _Begun:
+    """Return the model of the used sensors, and where its fit starts."""
+    points = measured_points(prepared.scans[0])
+    references = expected_spectra(
+        prepared.scans[:1],
+        prepared.stresses[:1],
+        reference_spectra(prepared.stresses[:1], [points]),
+    )
+    forward = ForwardModel(points, references)
+    alone = fit_gaussian_to_points(forward, np.ones_like(points.u))
+    bare = replace(points, curvature=np.zeros(1))
+    gaussian = replace(
+        alone,
+        points=bare,
+        jacobian=np.zeros((0, 2)),
+        drift=np.zeros(0),
+        predicted=np.zeros(0),
+        geometry=forward.geometry(alone.centre),
+    )
+    used = found.used
+    high = np.maximum(presses.u - found.baseline[used, None], 0.0) * presses.keep
+    high[high < _HIGH * found.peak[used, None]] = 0.0
+    centres = (high @ presses.places.T) / high.sum(axis=1)[:, None]
+    largest = int(np.argmax(found.peak[used]))
+    pairs = _pairs(scan, found, centres, crosstalk)
+    reach = np.hypot(*np.ptp(presses.places, axis=1))
+    waves = Waves.of(references[0], reach)
+    layout = Layout.of(presses, pairs, largest, 0)
+    model = JointModel(presses, waves, layout, np.zeros((forward.k.size, 0)))
+    drift = np.zeros((used.sum(), presses.drift.shape[1]))
+    drift[:, 0] = found.baseline[used]
+    peak = found.peak[used]
+    transfer = gaussian_transfer(forward.k, alone.sigma)
+    state = ArrayState(
+        peak / peak[largest],
+        centres,
+        np.eye(used.sum()),
+        drift,
+        alone.conversion_constant * waves.mix @ transfer,
+        np.zeros((used.sum(), 0)),
+    )
+    noise = Noise((_AT_FIRST * peak) ** 2, np.zeros(presses.board.max() + 1))
+    return _Begun(model, state, noise, gaussian, forward)
+
+
+def _own_fit(fit: JointFit, *, shapes: bool) -> JointFit:
+    """Fit a width of its own for each sensor, and with ``shapes`` departures from it, too."""
+    gaussian = fit.gaussian
+    k = fit.forward.k
+    kernels = [
+        gaussian.conversion_constant
+        * gaussian.sigma
+        * gaussian_transfer_slope(k, gaussian.sigma)[:, None]
+    ]
+    if shapes:
+        kernels += [
+            shape.rings(gaussian.width, gaussian.conversion_constant).transform(k)
+            for shape in _OWN_SHAPES
+        ]
+    own = np.hstack(kernels)
+    model = fit.model
+    largest = int(np.flatnonzero(model.layout.gains < 0)[0])
+    layout = Layout.of(model.presses, model.layout.crosstalk >= 0, largest, own.shape[1])
+    state = replace(fit.state, own=np.zeros((fit.state.gain.size, own.shape[1])))
+    model = replace(model, layout=layout, own_kernels=own)
+    return fit_shape(model, state, fit.noise, gaussian, fit.forward)
+
+
+def _effects(prepared: Prepared, fit: JointFit) -> Arrays:
+    """Return what one standard uncertainty of each stated input does to the posterior's columns."""
+    scan = prepared.scans[0]
+    k = fit.forward.k
+    kernel = fit.posterior.kernel
+    changes = reference_sensitivities([scan], [fit.reference])
+    products = {name: change[0] * kernel for name, change in changes.items()}
+    scale = scan.position_scale_uncertainty
+    if scale:
+        # All distances are larger: the transform of a function of them is dilated.
+        product = fit.reference.values * kernel
+        products["position_scale"] = -scale * (2 * product + k * np.gradient(product, k))
+    return input_columns(fit, products)
+
+
+def _array(scan: Scan, prepared: Prepared, found: Sorted, fit: JointFit) -> SensorArray:
+    """Return the calibrated array, with NaN for sensors that are not used."""
+    used = found.used
+    presses = fit.model.presses
+    inputs = _effects(prepared, fit)
+    columns = np.column_stack([fit.posterior.root, *inputs.values()])
+    numbers = array_numbers(fit, fit.posterior, columns)
+    modes, of_modes = kernel_modes(fit, numbers)
+    near = fit.model.layout.crosstalk >= 0
+    everything = of_all_sensors(stacked(numbers, near, of_modes), used)
+    count = fit.posterior.root.shape[1]
+    effects = {name: everything[:, count + i] for i, name in enumerate(inputs)}
+    n = used.size
+    for name, share in _scalings(prepared).items():
+        # What scales all readings alike scales A.
+        effects[name] = np.zeros(len(everything))
+        effects[name][:n] = -share * used
+    state = fit.state
+    fixed = [axis for axis in (0, 1) if axis not in presses.axes]
+    centres = state.centres.copy()
+    centres[:, fixed] = np.nan
+    width = state.own[:, 0] if state.own.size else np.zeros(used.sum())
+    common = np.where(
+        np.equal.outer(presses.board, presses.board), fit.noise.common[presses.board], 0
+    )
+    first = prepared.scans[0]
+    return SensorArray(
+        sensors=scan.sensors,
+        used=used,
+        conversion_constants=_spread(np.exp(numbers.log_a), used),
+        centres=_spread(centres, used),
+        crosstalk=_spread_square(state.crosstalk, used, np.eye(n)),
+        estimated=_spread_square(near, used, np.zeros((n, n), bool)),
+        gaussian_sigmas=_spread(fit.gaussian.sigma * (1 + width), used),
+        baselines=_spread(state.drift[:, 0], used),
+        noise=_spread_square(np.diag(fit.noise.own) + common, used, np.full((n, n), np.nan)),
+        k=fit.forward.k,
+        kernels=numbers.kernels if len(numbers.kernels) == 1 else _spread(numbers.kernels, used),
+        modes=replace(
+            modes, owner=np.where(modes.owner < 0, -1, np.flatnonzero(used)[modes.owner])
+        ),
+        root=everything[:, :count],
+        effects=effects,
+        film=first.set_up.film,
+        indenter=first.set_up.indenter,
+        load=first.stated_load,
+        readings=ArrayReadings(
+            *presses.places,
+            presses.load,
+            _spread(np.where(presses.keep, presses.u, np.nan), used),
+            _spread(fit.model.predicted(state), used),
+            _spread(state.drift @ presses.drift.T, used),
+        ),
+        line_y=first.line_offset,
+        layout=scan.layout,
+        layout_uncertainty=scan.layout_uncertainty,
+        reading_low=scan.reading_low,
+        reading_high=scan.reading_high,
+        reading=prepared.reading,
+        process=Process.of_now(input_scan=scan.source),
+    )
+
+
+def _scalings(prepared: Prepared) -> dict[str, float]:
+    """Relative standard uncertainties of what scales all readings of the scan alike."""
+    scan = prepared.scans[0]
+    shares = {"gain": scan.gain_uncertainty or 0.0}
+    shares["load"] = (scan.load_uncertainty or 0.0) / scan.stated_load
+    shares["reference_convergence"] = prepared.stresses[0].convergence or 0.0
+    return {name: share for name, share in shares.items() if share}
+
+
+def _spread(values: FloatArray, used: BoolArray) -> FloatArray:
+    """Return rows of the used sensors among those of all, NaN of the others."""
+    spread = np.full((used.size, *values.shape[1:]), np.nan)
+    spread[used] = values
+    return spread
+
+
+def _spread_square(values: Any, used: BoolArray, empty: Any) -> Any:
+    empty[np.ix_(used, used)] = values
+    return empty

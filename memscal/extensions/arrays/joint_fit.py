@@ -26,13 +26,14 @@ from memscal.axisymmetry.hankel import RadialSpectrum
 from memscal.axisymmetry.kernels import gaussian_transfer, gaussian_transfer_slope
 from memscal.errors import FitError
 from memscal.estimation import bayesian
+from memscal.estimation.bayesian import Weighing
 from memscal.estimation.departures import ReducedScan, departure_basis
 from memscal.estimation.forward import ForwardModel
 from memscal.estimation.gaussian import GaussianFit
 from memscal.estimation.voltage_map import VoltageMap, square_root
 from memscal.extensions.arrays.joint_model import ArrayState, Information, JointModel, Layout, Noise
 from memscal.extensions.arrays.presses import Presses, Waves
-from memscal.model.arrays import ArrayPair, FloatArray, array_record
+from memscal.model.arrays import FloatArray, array_record
 
 #: Standard deviations of crosstalk about its mean that are weighed, and that of the mean.
 SPREADS = (0.0005, 0.001, 0.002, 0.005, 0.01, 0.02, 0.05)
@@ -43,7 +44,7 @@ _OWN_SHAPE = 0.05
 _MOST_ROUNDS = 25
 _SHAPE_ROUNDS = 5
 #: Steps end below this share of a standard uncertainty.
-_SETTLED = 0.02
+_SETTLED = 0.1
 #: The longest step, in ln g or in widths of G.
 _LONGEST = 0.5
 
@@ -68,9 +69,8 @@ class ReducedArray(ReducedScan):
 
 @array_record
 class Posterior:
-    """What the readings tell of the parameters and of the common kernel, by a prior of crosstalk."""
+    """What the readings tell of parameters and common kernel, by a prior of the crosstalk."""
 
-    log_evidence: float
     change: FloatArray  # (p,): of the parameters
     kernel: FloatArray  # (nodes,): transform of the common kernel, in V/Pa
     root: FloatArray  # (p + nodes, c): of the covariance of both
@@ -89,6 +89,7 @@ class JointFit:
     posterior: Posterior
     widest: Posterior  # by the widest prior of the crosstalk
     forward: ForwardModel
+    log_evidence: float
 
     @property
     def reference(self) -> RadialSpectrum:
@@ -102,24 +103,16 @@ class JointFit:
         return np.where(presses.keep, presses.u - self.model.predicted(self.state), 0.0)
 
 
-def crosstalk_precision(layout: Layout, spread: float) -> ArrayPair:
-    """Return places (c,) of the crosstalk among the parameters, and its prior precision."""
-    places = layout.crosstalk[layout.crosstalk >= 0]
-    count = places.size
-    # Of t^2 1 + m^2 1 1', by Sherman and Morrison.
-    alike = WIDEST**2 / (spread**2 + count * WIDEST**2) if count else 0.0
-    return places, (np.eye(count) - alike) / spread**2
-
-
 def prior_precision(layout: Layout, spread: float) -> FloatArray:
     """Return the prior precision of all parameters, (p, p); zero of what has a flat prior."""
     precision = np.zeros((layout.count, layout.count))
-    places, of_crosstalk = crosstalk_precision(layout, spread)
-    precision[np.ix_(places, places)] = of_crosstalk
+    places = layout.crosstalk[layout.crosstalk >= 0]
+    # Of t^2 1 + m^2 1 1', by Sherman and Morrison.
+    alike = WIDEST**2 / (spread**2 + places.size * WIDEST**2)
+    precision[np.ix_(places, places)] = (np.eye(places.size) - alike) / spread**2
     if layout.own.size:
-        precision[layout.own, layout.own] = np.append(
-            1 / OWN_WIDTH**2, np.full(layout.own.shape[1] - 1, 1 / _OWN_SHAPE**2)
-        )
+        shapes = np.full(layout.own.shape[1] - 1, _OWN_SHAPE**-2)
+        precision[layout.own, layout.own] = np.append(OWN_WIDTH**-2, shapes)
     return precision
 
 
@@ -249,29 +242,38 @@ def fit_array(
     model: JointModel, state: ArrayState, noise: Noise, gaussian: GaussianFit, forward: ForwardModel
 ) -> JointFit:
     """Fit an array from a start: a Gaussian first, then the shape of G that is common to all."""
-    presses = model.presses
     for _ in range(2):
         state, gaussian = fit_gaussian(model, state, noise, gaussian)
         noise = _noise(model, state)
-    kernel = state.kernel
+    first = fit_shape(model, state, noise, gaussian, forward)
+    return fit_shape(model, first.state, _noise(model, first.state), gaussian, forward)
+
+
+def fit_shape(
+    model: JointModel, state: ArrayState, noise: Noise, gaussian: GaussianFit, forward: ForwardModel
+) -> JointFit:
+    """Fit an array from a fit with a Gaussian, or one without own kernels."""
+    presses = model.presses
     everything = np.eye(len(model.waves.mix))
     for _ in range(_SHAPE_ROUNDS):
         about = replace(state, kernel=model.waves.mix @ _gaussian(gaussian))
         data = presses.u - model.predicted(about)
         information = model.information(state, noise, everything, data)
-        posteriors = [
-            posterior(model, information, state, gaussian, forward, spread)
+        weighed = [
+            weighed_by(model, information, state, gaussian, forward, spread)
             for spread in _spreads(model.layout)
         ]
-        best = max(posteriors, key=attrgetter("log_evidence"))
+        likeliest = max(weighed, key=attrgetter("log_evidence"))
+        best = likeliest.posterior()
         moved = model.layout.moved(state, best.change, presses.axes)
-        kernel = model.waves.mix @ best.kernel
-        state = replace(moved, kernel=kernel)
-        noise = _noise(model, state)
+        state = replace(moved, kernel=model.waves.mix @ best.kernel)
         size = np.sqrt(np.sum(best.root[: model.layout.count] ** 2, axis=1))
-        if np.all(abs(best.change) < 5 * _SETTLED * size):
+        if np.all(abs(best.change) < _SETTLED * size):
             break
-    return JointFit(model, state, noise, information, gaussian, best, posteriors[-1], forward)
+    widest = weighed[-1].posterior()
+    evidence = likeliest.log_evidence
+    steps = (model, state, noise, information, gaussian, best, widest)
+    return JointFit(*steps, forward, evidence)
 
 
 def _spreads(layout: Layout) -> Sequence[float]:
@@ -289,20 +291,53 @@ def _noise(model: JointModel, state: ArrayState) -> Noise:
     return noise_of(presses, residual, model.layout.count / len(presses.u))
 
 
-def posterior(
+@array_record
+class Weighed:
+    """Shapes of the common G, weighed where what is each sensor's own is integrated out."""
+
+    log_evidence: float
+    normal: Normal  # of the parameters
+    by_others: FloatArray  # (p, 1 + f): the parameters by data and kernels
+    columns: FloatArray  # (r, 1 + f): data and kernels that are left
+    mix: FloatArray
+    weighing: Weighing
+
+    def posterior(self) -> Posterior:
+        """Average the shapes: all parameters and the kernel, and the root of their covariance."""
+        weighed = self.weighing.average(allowing=0)
+        model = self.weighing.reduced.model
+        gaussian = self.weighing.reduced.fit
+        kernels = self.weighing.basis.kernels(model.k)
+        # The parameters given a kernel: what they are without it, less what it explains of them.
+        by_kernel = self.by_others[:, 1:] @ (self.mix @ kernels)
+        of_kernel = square_root(weighed.covariance, np.diag(weighed.covariance))
+        count = len(by_kernel)
+        of_own = np.linalg.cholesky(self.normal.solve(np.eye(count)))
+        none = np.zeros((len(kernels), count))
+        root = np.block([[of_own, -by_kernel @ of_kernel], [none, kernels @ of_kernel]])
+        kernel_gain = weighed.gain.dense() @ self.columns[:, 1:]
+        own_gain = self.by_others[:, 1:] - by_kernel @ kernel_gain
+        return Posterior(
+            change=self.by_others[:, 0] - by_kernel @ weighed.mean,
+            kernel=_gaussian(gaussian) + kernels @ weighed.mean,
+            root=root,
+            gain=np.vstack([own_gain, kernels @ kernel_gain]),
+        )
+
+
+def weighed_by(
     model: JointModel,
     information: Information,
     state: ArrayState,
     gaussian: GaussianFit,
     forward: ForwardModel,
     spread: float,
-) -> Posterior:
-    """Integrate out what is each sensor's own, and weigh the shapes of the common G."""
-    layout = model.layout
-    precision = prior_precision(layout, spread)
+) -> Weighed:
+    """Integrate out what is each sensor's own by a prior, and weigh the shapes of the common G."""
+    precision = prior_precision(model.layout, spread)
+    values = parameters_of(model.layout, state)
     gram = information.gram.copy()
     own = information.parameters
-    values = parameters_of(layout, state)
     gram[own, own] += precision
     gram[own, 0] -= precision @ values
     gram[0, own] = gram[own, 0]
@@ -310,33 +345,15 @@ def posterior(
     normal = Normal(gram[own, own])
     others = information.others
     by_others = normal.solve(gram[own][:, others])
-    left = gram[np.ix_(others, others)] - gram[own][:, others].T @ by_others
-    columns = _root_of(left)
-    count = information.readings - layout.count
+    columns = _root_of(gram[np.ix_(others, others)] - gram[own][:, others].T @ by_others)
     reduced = _reduced(columns, model.waves, gaussian, forward)
     basis = departure_basis(gaussian, reduced)
+    count = information.readings - model.layout.count
     weighing = bayesian.weigh_departures(reduced, basis, count, least_noise=1.0)
-    weighed = weighing.average(allowing=0)
-    kernels = basis.kernels(forward.k)
-    combined = model.waves.mix @ kernels
-    # The parameters given a kernel: what they are without it, less what it explains of them.
-    by_kernel = by_others[:, 1:] @ combined
-    change = by_others[:, 0] - by_kernel @ weighed.mean
-    of_kernel = square_root(weighed.covariance, np.diag(weighed.covariance))
-    of_own = np.linalg.cholesky(normal.solve(np.eye(layout.count)))
-    root = np.block(
-        [
-            [of_own, -by_kernel @ of_kernel],
-            [np.zeros((len(kernels), layout.count)), kernels @ of_kernel],
-        ]
-    )
-    kernel_gain = weighed.gain.dense() @ columns[:, 1:]
-    gain = np.vstack([by_others[:, 1:] - by_kernel @ kernel_gain, kernels @ kernel_gain])
-    evidence = weighing.evidence - 0.5 * normal.log_determinant
-    _, of_crosstalk = crosstalk_precision(layout, spread)
-    evidence += 0.5 * np.linalg.slogdet(of_crosstalk)[1]
-    kernel = _gaussian(gaussian) + kernels @ weighed.mean
-    return Posterior(float(evidence), change, kernel, root, gain)
+    stated = np.diag(precision) > 0
+    volume = np.linalg.slogdet(precision[np.ix_(stated, stated)])[1] - normal.log_determinant
+    evidence = float(weighing.evidence + 0.5 * volume)
+    return Weighed(evidence, normal, by_others, columns, model.waves.mix, weighing)
 
 
 def _root_of(gram: FloatArray) -> FloatArray:

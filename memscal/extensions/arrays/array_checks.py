@@ -1,0 +1,345 @@
+"""Quality checks of a calibrated array, each with the sensors that fail it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+from scipy.special import chdtrc, chdtri, ndtri
+
+from memscal.calibration.prepare import Prepared
+from memscal.extensions.arrays.array_data import ArrayData
+from memscal.extensions.arrays.array_numbers import array_numbers
+from memscal.extensions.arrays.joint_fit import JointFit
+from memscal.extensions.arrays.presses import Sorted
+from memscal.model.arrays import BoolArray, FloatArray
+from memscal.model.checks import FALSE_ALARM, Message, QualityCheck, check, override_messages
+from memscal.model.scan import Scan
+
+#: Crosstalk is identified where its median standard uncertainty is at most this.
+IDENTIFIED = 0.005
+#: Estimates by common and by own shapes agree within so many uncertainties of their difference.
+_AGREEING = 2.0
+#: A scan reaches beyond the last sensor by so many thicknesses of the film.
+_BEYOND = 2.0
+
+
+class Failing(NamedTuple):
+    """A check, and the numbers of the used sensors that fail it."""
+
+    check: QualityCheck
+    sensors: FloatArray | tuple[()] = ()
+
+
+def array_checks(
+    fit: JointFit, compared: JointFit, array: ArrayData, found: Sorted
+) -> tuple[tuple[QualityCheck, ...], dict[str, tuple[str, ...]]]:
+    """Check a fit, against one with own widths or shapes, or a common one; name failing sensors."""
+    names = np.array(array.sensors)
+    results = {}
+    failing = {}
+    used = np.flatnonzero(found.used)
+    for each in _of_all(array, found):
+        results[each.check.name] = each.check
+        failing[each.check.name] = tuple(names[np.asarray(each.sensors, np.intp)].tolist())
+    for each in _of_fit(fit, compared, array):
+        results[each.check.name] = each.check
+        numbers = used[np.asarray(each.sensors, np.intp)]
+        failing[each.check.name] = tuple(names[numbers].tolist())
+    return tuple(results.values()), failing
+
+
+def _of_all(array: ArrayData, found: Sorted) -> Iterator[Failing]:
+    dead = np.flatnonzero(found.dead)
+    yield Failing(
+        check(
+            "dead_taxels",
+            dead.size,
+            0.0,
+            "Number of sensors whose peak is below 8 times the noise of their outermost readings. "
+            "They are left out: look at their wiring, or press on them.",
+        ),
+        dead,
+    )
+    clipped = np.flatnonzero(found.at_ceiling)
+    yield Failing(
+        check(
+            "saturation",
+            found.at_ceiling.sum(),
+            0.0,
+            "Number of readings at a ceiling. They are left out, the others of their sensors "
+            "count: lower gain or load.",
+        ),
+        clipped,
+    )
+    places = array.places[array.used]
+    pressed = np.stack([array.readings.x, array.readings.y], axis=1)
+    axes = [axis for axis in (0, 1) if np.ptp(pressed[:, axis]) > 0]
+    margins = np.minimum(
+        places[:, axes] - pressed[:, axes].min(axis=0),
+        pressed[:, axes].max(axis=0) - places[:, axes],
+    ).min(axis=1)
+    short = _BEYOND - margins / array.film.thickness
+    yield Failing(
+        check(
+            "ends_covered",
+            short.max(),
+            1e-6,
+            f"Thicknesses of the film that the scan falls short of reaching {_BEYOND:g} of them "
+            "beyond the last sensor. Baselines and tails of the outer sensors are then unsure: "
+            "scan farther.",
+        ),
+        np.flatnonzero(array.used)[short > 1e-6],
+    )
+    if array.layout is not None and array.used.sum() > 2 and not array.on_a_line:
+        yield _layout(array)
+
+
+def _layout(array: ArrayData) -> Failing:
+    """Compare the centres with the layout, shifted, turned and scaled: complex numbers."""
+    used = np.flatnonzero(array.used)
+    assert array.layout is not None
+    found = array.centres[used] @ [1, 1j]
+    design = array.layout[used] @ [1, 1j]
+    columns = np.stack([np.ones_like(design), design], axis=1)
+    left = abs(found - columns @ np.linalg.lstsq(columns, found)[0])
+    n = len(array.sensors)
+    variances = array.uncertainties()[n : 3 * n].reshape(2, n)[:, used] ** 2
+    variance = variances.mean(axis=0) + (array.layout_uncertainty or 0.0) ** 2
+    squares = left**2 / variance
+    degrees = 2 * used.size - 4
+    return Failing(
+        check(
+            "layout",
+            squares.sum(),
+            chdtri(degrees, FALSE_ALARM),
+            "Chi-square of the centres against the layout, which may be shifted, turned and "
+            "scaled. A failure means that sensors are not where the layout has them, or their names are "
+            "mixed up.",
+            float(chdtrc(degrees, squares.sum())),
+        ),
+        used[squares > chdtri(2, FALSE_ALARM / used.size)],
+    )
+
+
+def _of_fit(fit: JointFit, compared: JointFit, array: ArrayData) -> Iterator[Failing]:
+    near = fit.model.layout.crosstalk >= 0
+    if near.any():
+        yield _identified(fit, near)
+        yield _models_agree(fit, compared)
+    if len(near) > 1:
+        yield _common_kernel(fit if fit.model.layout.own.size else compared)
+    yield _chi_square(fit, array)
+    if len(near) > 1:
+        yield _press_errors(fit)
+        yield _common_mode(fit)
+
+
+def crosstalk_uncertainty(fit: JointFit) -> float:
+    """Median standard uncertainty of the estimated crosstalk by its widest prior."""
+    places = fit.model.layout.crosstalk[fit.model.layout.crosstalk >= 0]
+    return float(np.median(np.linalg.norm(fit.widest.root[places], axis=1)))
+
+
+def _identified(fit: JointFit, near: BoolArray) -> Failing:
+    centres = fit.state.centres
+    pitch = np.hypot(*(centres[:, None] - centres).T)[near].min()
+    value = crosstalk_uncertainty(fit)
+    limited = value > IDENTIFIED
+    return Failing(
+        check(
+            "crosstalk_identified",
+            value,
+            IDENTIFIED,
+            "Median standard uncertainty of the crosstalk by the readings alone, whatever its "
+            f"spread, at a least distance of {pitch * 1e3:.3g} mm. A failure means that crosstalk "
+            "and the shape of G are one thing to this scan: it is left out of the table, and A has "
+            "the uncertainty that this costs. Scan a raster, take a common shape, or a thinner "
+            "film.",
+        ),
+        np.flatnonzero(near.any(axis=1)) if limited else (),
+    )
+
+
+def _models_agree(fit: JointFit, compared: JointFit) -> Failing:
+    """Compare A and crosstalk by common and by own shapes: of nested models, as Hausman's test."""
+    both = []
+    for each in (fit, compared):
+        numbers = array_numbers(each, each.posterior, each.posterior.root)
+        crosstalk = each.state.crosstalk[each.model.layout.crosstalk >= 0]
+        roots = [numbers.of_a, numbers.of_crosstalk[each.model.layout.crosstalk >= 0]]
+        variance = np.sum(np.vstack(roots) ** 2, axis=1)
+        both.append((np.append(numbers.log_a, crosstalk), variance))
+    difference = both[0][0] - both[1][0]
+    # The variance of the difference is that of the variances, at least a share of the larger one.
+    larger = np.maximum(both[0][1], both[1][1])
+    apart = np.maximum(abs(both[0][1] - both[1][1]), 0.1 * larger)
+    z = difference / np.sqrt(apart)
+    m = len(fit.state.gain)
+    return Failing(
+        check(
+            "crosstalk_model",
+            np.sqrt(np.mean(z**2)),
+            _AGREEING,
+            "Difference of A and crosstalk by a common and by own shapes of G, over its "
+            "uncertainty, root mean square. A failure means that the sensors' shapes differ: take "
+            "own ones, of a raster.",
+        ),
+        np.flatnonzero(abs(z[:m]) > chdtri(1, FALSE_ALARM / m) ** 0.5),
+    )
+
+
+def _common_kernel(own: JointFit) -> Failing:
+    """Test whether widths differ, where the common shape is free."""
+    layout = own.model.layout
+    gram = own.information.gram
+    widths = 1 + layout.own[:, 0]
+    rest = np.delete(np.arange(1, len(gram)), layout.own.ravel())
+    scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
+    scaled = gram / np.outer(scale, scale)
+    inverse = np.linalg.pinv(scaled[np.ix_(rest, rest)], rcond=1e-10, hermitian=True)
+    explained = inverse @ scaled[np.ix_(rest, np.append(widths, 0))]
+    left = scaled[np.ix_(widths, np.append(widths, 0))] - scaled[np.ix_(widths, rest)] @ explained
+    information = left[:, :-1]
+    values, vectors = np.linalg.eigh(information)
+    told = values > 1e-8 * values[-1]
+    found = vectors.T @ (left[:, -1] + information @ (own.state.own[:, 0] * scale[widths]))
+    square = np.sum(found[told] ** 2 / values[told])
+    degrees = min(int(told.sum()), len(widths) - 1)
+    z = abs(own.state.own[:, 0]) / np.linalg.norm(own.posterior.root[layout.own[:, 0]], axis=1)
+    return Failing(
+        check(
+            "common_kernel",
+            square,
+            chdtri(degrees, FALSE_ALARM),
+            "Fall of chi-square by widths of the sensors' own, where the common shape is free. A "
+            "failure means that one G does not describe all of them.",
+            float(chdtrc(degrees, square)),
+        ),
+        np.flatnonzero(z > -ndtri(FALSE_ALARM / z.size)),
+    )
+
+
+def _whitened(fit: JointFit) -> FloatArray:
+    """Residuals (m, t) over the sensors' own noise."""
+    return np.asarray(fit.residual / np.sqrt(fit.noise.own)[:, None])
+
+
+def _chi_square(fit: JointFit, array: ArrayData) -> Failing:
+    """Compare the residuals of each sensor with the noise: as stated, or between neighbours."""
+    presses = fit.model.presses
+    count = presses.keep.sum(axis=1)
+    residual = fit.residual
+    if presses.stated is not None:
+        ratio = np.sum((residual / presses.stated) ** 2, axis=1, where=presses.keep) / count
+    else:
+        step = np.diff(residual, axis=1)
+        both = presses.keep[:, 1:] & presses.keep[:, :-1]
+        between = np.mean(step**2, axis=1, where=both) / 2
+        ratio = np.mean(residual**2, axis=1, where=presses.keep) / between
+    # Of the ratio of the mean square to that of steps the variance is 1/n, of chi-square 2/n.
+    spread = np.sqrt((1.0 if presses.stated is None else 2.0) / count)
+    beyond = (ratio - 1) / spread
+    worst = int(np.argmax(beyond))
+    limit = 1 - ndtri(FALSE_ALARM / beyond.size) * spread[worst]
+    name = array.sensors[np.flatnonzero(array.used)[worst]]
+    return Failing(
+        check(
+            "array_chi_square",
+            ratio[worst],
+            limit,
+            "Mean square of the residuals over the noise, as stated or as neighbouring readings "
+            f"have it, of the worst sensor, {name}. A failure means that the model misses "
+            "something: reference, crosstalk of farther pairs, drift, memory of the film.",
+        ),
+        np.flatnonzero(beyond > -ndtri(FALSE_ALARM / beyond.size)),
+    )
+
+
+def _press_errors(fit: JointFit) -> Failing:
+    """Test whether readings of one press share errors of place and load that are not counted."""
+    presses = fit.model.presses
+    signals, slopes = fit.model.signals(fit.state)
+    towards = fit.model.distances(fit.state)[1]
+    patterns = [fit.state.crosstalk @ (slopes * towards[axis]) for axis in presses.axes]
+    patterns.append(fit.state.crosstalk @ signals)
+    noise = fit.noise
+    covariance = np.diag(noise.own) + np.where(
+        np.equal.outer(presses.board, presses.board), noise.common[presses.board], 0.0
+    )
+    white = np.linalg.cholesky(np.linalg.inv(covariance)).T
+    residual = white @ fit.residual
+    columns = np.stack([white @ (pattern * presses.keep) for pattern in patterns])
+    # Of each press the share of the residuals that the patterns explain.
+    matrix = np.moveaxis(columns, (0, 1, 2), (2, 1, 0))
+    size = np.linalg.norm(matrix, axis=1, keepdims=True)
+    left = np.linalg.svd(matrix / np.where(size > 0, size, 1.0), full_matrices=False)[0]
+    explained = np.sum((left.mT @ residual.T[:, :, None]) ** 2, axis=(1, 2))
+    # Where errors of place and load are stated, what they make is expected.
+    stated = [presses.place_errors, *([0.0] * (len(presses.axes) - 1)), presses.load_errors]
+    made = sum(np.sum((c * s) ** 2, axis=0) for c, s in zip(columns, stated, strict=True))
+    rank = left.shape[2]
+    degrees = rank * residual.shape[1]
+    value = np.sum(explained / (1 + made / rank))
+    return Failing(
+        check(
+            "press_errors",
+            value / degrees,
+            chdtri(degrees, FALSE_ALARM) / degrees,
+            "What errors of place and load common to a press explain of the residuals, over what "
+            "noise has them explain. A failure means that place or load scatter from press to "
+            "press by more than is stated (x_errors, normal_load_errors).",
+            float(chdtrc(degrees, value)),
+        )
+    )
+
+
+def _common_mode(fit: JointFit) -> Failing:
+    """Test whether pairs of sensors have more, or less, noise in common than a board has."""
+    presses = fit.model.presses
+    white = _whitened(fit)
+    count = np.maximum(presses.keep.astype(float) @ presses.keep.T, 1)
+    common = np.where(
+        np.equal.outer(presses.board, presses.board), fit.noise.common[presses.board], 0.0
+    )
+    expected = common / np.sqrt(np.outer(fit.noise.own, fit.noise.own))
+    total = np.sqrt(np.outer(1 + np.diag(expected), 1 + np.diag(expected)))
+    z = abs(white @ white.T / count - expected) / total * np.sqrt(count)
+    pairs = np.triu_indices(len(white), 1)
+    limit = float(-ndtri(FALSE_ALARM / (2 * pairs[0].size)))
+    np.fill_diagonal(z, 0.0)
+    return Failing(
+        check(
+            "common_mode",
+            z[pairs].max(),
+            limit,
+            "Largest difference of the noise that two sensors have in common from that of their "
+            "board, in standard deviations. A failure means that some sensors share more: state "
+            "their boards, or look for presses that are wrong for several.",
+        ),
+        np.flatnonzero(z.max(axis=1) > limit),
+    )
+
+
+def array_messages(
+    scan: Scan, prepared: Prepared, found: Sorted, fit: JointFit
+) -> Iterator[Message]:
+    """Yield what a user has to know beside the checks."""
+    yield from override_messages(prepared.overridden)
+    if found.dead.any():
+        names = ", ".join(np.array(scan.sensors)[found.dead])
+        yield Message("dead_taxels", f"Dead and left out: {names}.", "warning")
+    places = fit.model.layout.crosstalk[fit.model.layout.crosstalk >= 0]
+    if places.size:
+        values = fit.state.crosstalk[fit.model.layout.crosstalk >= 0]
+        covariance = fit.widest.root[places] @ fit.widest.root[places].T
+        square = float(values @ np.linalg.solve(covariance, values))
+        of_mean = np.linalg.norm(fit.posterior.root[places].mean(axis=0))
+        yield Message(
+            "crosstalk",
+            f"Crosstalk is {values.mean():.2%} on the mean (u {of_mean:.2%}); "
+            f"none at all has the probability p = {chdtrc(places.size, square):.2g}.",
+        )
+    if scan.synthetic is not None:
+        yield Message("synthetic", "The scan is synthetic: its truth is stored in it.")
