@@ -115,8 +115,8 @@ def _layout(array: ArrayData) -> Failing:
             squares.sum(),
             chdtri(degrees, FALSE_ALARM),
             "Chi-square of the centres against the layout, which may be shifted, turned and "
-            "scaled. A failure means that sensors are not where the layout has them, or their names are "
-            "mixed up.",
+            "scaled. A failure means that sensors are not where the layout has them, or that "
+            "names are mixed up.",
             float(chdtrc(degrees, squares.sum())),
         ),
         used[squares > chdtri(2, FALSE_ALARM / used.size)],
