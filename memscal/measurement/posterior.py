@@ -74,7 +74,7 @@ def film_transfer(set_up: SetUp, wavenumbers: Wavenumbers) -> FloatArray:
     if law == LINEAR:
         return linear.values
     change = rod_spectrum(set_up, linear, law) - rod_spectrum(set_up, linear, LINEAR)
-    return linear.values + _per_pressure(set_up, linear, change)
+    return linear.values + per_pressure(set_up, linear, change)
 
 
 def _linear_transfer(set_up: SetUp, wavenumbers: Wavenumbers) -> RadialSpectrum:
@@ -82,7 +82,7 @@ def _linear_transfer(set_up: SetUp, wavenumbers: Wavenumbers) -> RadialSpectrum:
     return RadialSpectrum(wavenumbers, values)
 
 
-def _per_pressure(set_up: SetUp, linear: RadialSpectrum, change: FloatArray) -> FloatArray:
+def per_pressure(set_up: SetUp, linear: RadialSpectrum, change: FloatArray) -> FloatArray:
     """Divide a change of the base stress (N) by the rod's pressure on a linear film."""
     pressure = rod_spectrum(set_up, linear, LINEAR) / linear.values
     return change * pressure / (pressure**2 + (_LEAST_PRESSURE * set_up.load) ** 2)
@@ -359,11 +359,11 @@ def posterior_of(
     set_up = scan.set_up.expected
     film = film_transfer(set_up, wavenumbers)
     scale = np.append(scan.stated_load * film, np.ones(mean.size - nodes))
-    film_changes = _film_changes(set_up, wavenumbers)
+    by_film = film_changes(set_up, wavenumbers)
     shared = shared_changes(apparatus, [scan], model.k)
     # One error of a film that sensor and contact share changes A G and the film's transfer.
-    names = tuple(name for name in film_changes | shared if name != "load")
-    of_film = columns_of(film_changes, names, nodes)
+    names = tuple(name for name in by_film | shared if name != "load")
+    of_film = columns_of(by_film, names, nodes)
     of_kernel = columns_of(shared, names, nodes)
     together = of_film * transfer[:, None] + of_kernel * film[:, None]
     _, sensor = sensor_changes(apparatus, model.k, shared)
@@ -517,7 +517,7 @@ def _sensor_changes(
     return transforms[:, 0], transforms[:, 1:]
 
 
-def _film_changes(set_up: SetUp, wavenumbers: Wavenumbers) -> Arrays:
+def film_changes(set_up: SetUp, wavenumbers: Wavenumbers) -> Arrays:
     """Change of the film's transfer function by one standard uncertainty of what is not known."""
     changes: Arrays = {}
     for name in ("thickness", "poisson_ratio"):
@@ -530,5 +530,5 @@ def _film_changes(set_up: SetUp, wavenumbers: Wavenumbers) -> Arrays:
     if law_at_once(set_up.under(NEO_HOOKEAN)) != LINEAR:
         linear = _linear_transfer(set_up, wavenumbers)
         for name, change in law_sensitivities(set_up, linear).items():
-            changes[name] = _per_pressure(set_up, linear, change * set_up.load)
+            changes[name] = per_pressure(set_up, linear, change * set_up.load)
     return changes

@@ -84,6 +84,9 @@ class ArrayData(Checked):
     load: float  # nominal, of the scan, in N
     readings: ArrayReadings
     kernel: str = "common"
+    # (nodes,): transform of the stress that the array was calibrated with, per newton; without it
+    # that of the rod on the film is calculated.
+    reference: FloatArray | None = None
     baseline_uncertainties: FloatArray | None = None  # (n,): in V
     line_y: float = 0.0  # of a single line, which passes the sensors at this y, in m
     layout: FloatArray | None = None
