@@ -410,6 +410,7 @@ def _array(scan: Scan, prepared: Prepared, found: Sorted, fit: JointFit) -> Sens
         baselines=_spread(state.drift[:, 0], used),
         noise=_spread_square(np.diag(fit.noise.own) + common, used, np.full((n, n), np.nan)),
         k=fit.forward.k,
+        reference=fit.reference.values,
         kernels=numbers.kernels if len(numbers.kernels) == 1 else _spread(numbers.kernels, used),
         modes=replace(
             modes, owner=np.where(modes.owner < 0, -1, np.flatnonzero(used)[modes.owner])
