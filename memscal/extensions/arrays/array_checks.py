@@ -6,13 +6,13 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import chdtrc, chdtri, ndtri
+from scipy.special import chdtrc, chdtri, ndtr, ndtri
 
 from memscal.calibration.prepare import Prepared
 from memscal.extensions.arrays.array_data import ArrayData
 from memscal.extensions.arrays.array_numbers import array_numbers
 from memscal.extensions.arrays.joint_fit import JointFit
-from memscal.extensions.arrays.presses import Sorted
+from memscal.extensions.arrays.presses import Sorted, fitted_layout
 from memscal.model.arrays import BoolArray, FloatArray
 from memscal.model.checks import FALSE_ALARM, Message, QualityCheck, check, override_messages
 from memscal.model.scan import Scan
@@ -21,8 +21,9 @@ from memscal.model.scan import Scan
 IDENTIFIED = 0.005
 #: Estimates by common and by own shapes agree within so many uncertainties of their difference.
 _AGREEING = 2.0
-#: A scan reaches beyond the last sensor by so many thicknesses of the film.
+#: A scan reaches beyond the last sensor by so many thicknesses of the film, or a little less.
 _BEYOND = 2.0
+_SHORT = 0.1
 
 
 class Failing(NamedTuple):
@@ -85,25 +86,23 @@ def _of_all(array: ArrayData, found: Sorted) -> Iterator[Failing]:
         check(
             "ends_covered",
             short.max(),
-            1e-6,
+            _SHORT,
             f"Thicknesses of the film that the scan falls short of reaching {_BEYOND:g} of them "
             "beyond the last sensor. Baselines and tails of the outer sensors are then unsure: "
             "scan farther.",
         ),
-        np.flatnonzero(array.used)[short > 1e-6],
+        np.flatnonzero(array.used)[short > _SHORT],
     )
     if array.layout is not None and array.used.sum() > 2 and not array.on_a_line:
         yield _layout(array)
 
 
 def _layout(array: ArrayData) -> Failing:
-    """Compare the centres with the layout, shifted, turned and scaled: complex numbers."""
+    """Compare the centres with the layout, shifted, turned and scaled."""
     used = np.flatnonzero(array.used)
     assert array.layout is not None
-    found = array.centres[used] @ [1, 1j]
-    design = array.layout[used] @ [1, 1j]
-    columns = np.stack([np.ones_like(design), design], axis=1)
-    left = abs(found - columns @ np.linalg.lstsq(columns, found)[0])
+    fitted = fitted_layout(array.layout, array.centres[used], array.used)[used]
+    left = np.hypot(*(array.centres[used] - fitted).T)
     n = len(array.sensors)
     variances = array.uncertainties()[n : 3 * n].reshape(2, n)[:, used] ** 2
     variance = variances.mean(axis=0) + (array.layout_uncertainty or 0.0) ** 2
@@ -333,13 +332,16 @@ def array_messages(
     places = fit.model.layout.crosstalk[fit.model.layout.crosstalk >= 0]
     if places.size:
         values = fit.state.crosstalk[fit.model.layout.crosstalk >= 0]
+        # Alike for all pairs it is seen by its mean; of a single pair by the whole.
+        of_mean = np.linalg.norm(fit.posterior.root[places].mean(axis=0))
         covariance = fit.widest.root[places] @ fit.widest.root[places].T
         square = float(values @ np.linalg.solve(covariance, values))
-        of_mean = np.linalg.norm(fit.posterior.root[places].mean(axis=0))
+        by_mean = 2 * ndtr(-abs(values.mean()) / of_mean)
+        p_value = min(2 * min(chdtrc(places.size, square), by_mean), 1.0)
         yield Message(
             "crosstalk",
-            f"Crosstalk is {values.mean():.2%} on the mean (u {of_mean:.2%}); "
-            f"none at all has the probability p = {chdtrc(places.size, square):.2g}.",
+            f"Crosstalk is {values.mean():.2%} on the mean (u {of_mean:.2%}); without any the "
+            f"probability of as much is p = {p_value:.2g}.",
         )
     if scan.synthetic is not None:
         yield Message("synthetic", "The scan is synthetic: its truth is stored in it.")

@@ -41,7 +41,8 @@ def array_numbers(fit: JointFit, posterior: Posterior, columns: FloatArray) -> A
     for j, places in enumerate(layout.own):
         changes[j % len(kernels)] += model.own_kernels @ columns[places]
     total = wavenumbers.integrals(kernels.T)
-    of_total = wavenumbers.integrals(np.moveaxis(changes, 0, 1)) / total[:, None]
+    integrals = np.stack([wavenumbers.integrals(change) for change in changes])
+    of_total = integrals / total[:, None]
     gains = np.where((layout.gains < 0)[:, None], 0.0, columns[layout.gains])
     centres = np.zeros((2, m, columns.shape[1]))
     centres[list(model.presses.axes)] = columns[layout.centres]

@@ -33,7 +33,13 @@ from memscal.extensions.arrays.array_numbers import (
 )
 from memscal.extensions.arrays.joint_fit import JointFit, fit_array, fit_shape
 from memscal.extensions.arrays.joint_model import ArrayState, JointModel, Layout, Noise
-from memscal.extensions.arrays.presses import Presses, Sorted, Waves, sorted_readings
+from memscal.extensions.arrays.presses import (
+    Presses,
+    Sorted,
+    Waves,
+    fitted_layout,
+    sorted_readings,
+)
 from memscal.extensions.arrays.sensor_array import SensorArray
 from memscal.formats.opened import opened_array
 from memscal.model.arrays import (
@@ -259,29 +265,35 @@ def _presses(
 
 def _pairs(
     scan: Scan,
-    found: Sorted,
-    centres: FloatArray,
+    used: BoolArray,
+    places: FloatArray,
     crosstalk: CrosstalkModel | Sequence[tuple[str, str]],
 ) -> BoolArray:
-    """Return which of the used sensors read which, (m, m)."""
-    used = np.flatnonzero(found.used)
-    m = used.size
+    """Return which sensors (rows) read which others, (n, n), at places (n, 2), NaN if unknown."""
+    n = used.size
     if not isinstance(crosstalk, str):
-        names = [scan.sensors[i] for i in used]
-        pairs = np.zeros((m, m), bool)
+        pairs = np.zeros((n, n), bool)
         for row, column in crosstalk:
-            require_names("There is no used sensor", [row, column], names)
-            pairs[names.index(row), names.index(column)] = row != column
+            require_names("There is no sensor", [row, column], scan.sensors)
+            pairs[scan.sensors.index(row), scan.sensors.index(column)] = row != column
         return pairs
     require_names("There is no model of crosstalk", [crosstalk], CrosstalkModel.__args__)
-    apart = ~np.eye(m, dtype=bool)
+    apart = ~np.eye(n, dtype=bool)
     if crosstalk == "full":
         return apart
-    if crosstalk == "none" or m == 1:
-        return np.zeros((m, m), bool)
-    places = centres if scan.layout is None else scan.layout[used]
+    if crosstalk == "none" or n == 1:
+        return np.zeros((n, n), bool)
     distance = np.hypot(*(places[:, None] - places).T)
-    return apart & (distance <= _NEIGHBOURS * distance[apart].min())
+    return apart & (distance <= _NEIGHBOURS * np.nanmin(distance[apart]))
+
+
+def _all_places(scan: Scan, used: BoolArray, centres: FloatArray) -> FloatArray:
+    """Return the places of all sensors, (n, 2): of dead ones by the layout, NaN without one."""
+    places = np.full((used.size, 2), np.nan)
+    places[used] = centres
+    if scan.layout is not None and used.sum() > 1:
+        places[~used] = fitted_layout(scan.layout, centres, used)[~used]
+    return places
 
 
 def _begun(
@@ -314,11 +326,15 @@ def _begun(
     high[high < _HIGH * found.peak[used, None]] = 0.0
     centres = (high @ presses.places.T) / high.sum(axis=1)[:, None]
     largest = int(np.argmax(found.peak[used]))
-    pairs = _pairs(scan, found, centres, crosstalk)
+    everywhere = _all_places(scan, used, centres)
+    pairs = _pairs(scan, used, everywhere, crosstalk)[used]
+    # Neighbours may read what a dead sensor does not tell.
+    leaking = pairs[:, ~used] & np.isfinite(everywhere[~used, 0])
     reach = np.hypot(*np.ptp(presses.places, axis=1))
     waves = Waves.of(references[0], reach)
-    layout = Layout.of(presses, pairs, largest, 0)
-    model = JointModel(presses, waves, layout, np.zeros((forward.k.size, 0)))
+    layout = Layout.of(presses, pairs[:, used], leaking, largest, 0)
+    none = np.zeros((forward.k.size, 0))
+    model = JointModel(presses, waves, layout, np.nan_to_num(everywhere[~used]), none)
     drift = np.zeros((used.sum(), presses.drift.shape[1]))
     drift[:, 0] = found.baseline[used]
     peak = found.peak[used]
@@ -330,6 +346,7 @@ def _begun(
         drift,
         alone.conversion_constant * waves.mix @ transfer,
         np.zeros((used.sum(), 0)),
+        np.zeros(leaking.shape),
     )
     noise = Noise((_AT_FIRST * peak) ** 2, np.zeros(presses.board.max() + 1))
     return _Begun(model, state, noise, gaussian, forward)
@@ -352,7 +369,8 @@ def _own_fit(fit: JointFit, *, shapes: bool) -> JointFit:
     own = np.hstack(kernels)
     model = fit.model
     largest = int(np.flatnonzero(model.layout.gains < 0)[0])
-    layout = Layout.of(model.presses, model.layout.crosstalk >= 0, largest, own.shape[1])
+    pairs = model.layout.crosstalk >= 0
+    layout = Layout.of(model.presses, pairs, model.layout.leaks >= 0, largest, own.shape[1])
     state = replace(fit.state, own=np.zeros((fit.state.gain.size, own.shape[1])))
     model = replace(model, layout=layout, own_kernels=own)
     return fit_shape(model, state, fit.noise, gaussian, fit.forward)

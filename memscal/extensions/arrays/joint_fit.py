@@ -106,7 +106,7 @@ class JointFit:
 def prior_precision(layout: Layout, spread: float) -> FloatArray:
     """Return the prior precision of all parameters, (p, p); zero of what has a flat prior."""
     precision = np.zeros((layout.count, layout.count))
-    places = layout.crosstalk[layout.crosstalk >= 0]
+    places = layout.crosstalking
     # Of t^2 1 + m^2 1 1', by Sherman and Morrison.
     alike = WIDEST**2 / (spread**2 + places.size * WIDEST**2)
     precision[np.ix_(places, places)] = (np.eye(places.size) - alike) / spread**2
@@ -119,8 +119,8 @@ def prior_precision(layout: Layout, spread: float) -> FloatArray:
 def parameters_of(layout: Layout, state: ArrayState) -> FloatArray:
     """Return the parameters that have a prior, (p,); zero of all others."""
     values = np.zeros(layout.count)
-    estimated = layout.crosstalk >= 0
-    values[layout.crosstalk[estimated]] = state.crosstalk[estimated]
+    for places, numbers in ((layout.crosstalk, state.crosstalk), (layout.leaks, state.leaks)):
+        values[places[places >= 0]] = numbers[places >= 0]
     values[layout.own] = state.own
     return values
 
@@ -277,7 +277,7 @@ def fit_shape(
 
 
 def _spreads(layout: Layout) -> Sequence[float]:
-    return SPREADS if np.any(layout.crosstalk >= 0) else SPREADS[-1:]
+    return SPREADS if layout.crosstalking.size else SPREADS[-1:]
 
 
 def _gaussian(gaussian: GaussianFit) -> FloatArray:

@@ -118,3 +118,12 @@ def _clipped(u: FloatArray, noise: float) -> IndexArray:
         if alike.size:
             return falling[: alike.max()]
     return falling[:0]
+
+
+def fitted_layout(layout: FloatArray, centres: FloatArray, used: BoolArray) -> FloatArray:
+    """Shift, turn and scale a layout (n, 2) to the centres (m, 2) of the used sensors: (n, 2)."""
+    # A similarity is a linear function of complex numbers.
+    design = layout @ [1, 1j]
+    columns = np.stack([np.ones_like(design), design], axis=1)
+    fitted = columns @ np.linalg.lstsq(columns[used], centres @ [1, 1j])[0]
+    return np.stack([fitted.real, fitted.imag], axis=1)
