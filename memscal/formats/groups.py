@@ -60,6 +60,7 @@ def read_source(file: SafeFile, path: str) -> SourceFile:
 
 KINDS = {
     "text": Kind(lambda _, text: str(text), SafeFile.text),
+    "names": Kind(lambda _, names: to_json(names), SafeFile.text_list),
     "note": Kind(lambda _, text: writer.note(text), SafeFile.text, inside="/data"),
     "truth": Kind(
         lambda _, truth: writer.count(truth),

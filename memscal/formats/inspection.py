@@ -112,7 +112,7 @@ def describe(path: FilePath, *, accept_altered: bool = False) -> Values:
                 value = place.removesuffix("_errors")
                 if quantity.origin:
                     provenance.append((place, quantity))
-                elif quantity.axes:
+                elif quantity.axes and file.array(place).ndim:
                     arrays.append(_array_row(file, place))
                 elif value == place:
                     quantities.append(_quantity_row(file, place))

@@ -13,7 +13,7 @@ from memscal.formats.hdf5.writer import SCHEMA_ATTRIBUTE, STRESS_SCHEMA
 from memscal.formats.scan import scan_from
 from memscal.formats.stress import stress_from
 from memscal.model.measured_stress import MeasuredStress
-from memscal.model.scan import Scan
+from memscal.model.scan import Scan, require_single
 from memscal.readings.noise_record import with_recorded_noise
 
 Scans: TypeAlias = Scan | FilePath | Sequence[Scan | FilePath]
@@ -26,7 +26,7 @@ Contacts: TypeAlias = Scan | MeasuredStress | FilePath | Sequence[Scan | Measure
 def opened_scan(
     scan: Any, most: int | None = None, *, accept_altered: bool = False, noise_record: Any = None
 ) -> Scan:
-    """Return a scan that is given itself or as a path, with ``most`` points in a file.
+    """Return a single sensor's scan, given itself or as a path, with ``most`` points in a file.
 
     Its noise is that of a noise record, given in one of these ways, or else its own.
     """
@@ -40,6 +40,7 @@ def opened_scan(
             f"{type(scan).__name__} is given where a Scan is needed.",
             cure="Give a scan, or the path of its file.",
         )
+    require_single(opened)
     if noise_record is not None:
         record = opened_scan(noise_record, accept_altered=accept_altered)
         opened = replace(opened, noise_record=record)

@@ -32,6 +32,9 @@ _DECLARED = by_name(records.SCAN_DATA.quantities)
 _OWN_SHAPE = {"x", "y", "x_errors", "y_errors", "u_zz_correlation"}
 _AS_SIGNAL = _DECLARED.keys() - _OWN_SHAPE
 _POINTS = ("point",)
+_SENSOR = ("sensor",)
+#: Fields of a layout, and how the names end of what its two columns are in files.
+_LAYOUTS = (("layout", ""), ("layout_uncertainty", "_errors"))
 _PAIRS = ("point", "point_prime")
 _BRANCHES = ", ".join(["0 not stated", *(f"{i} {name}" for name, i in BRANCHES.items())])
 _SYNTHETIC = (
@@ -104,7 +107,7 @@ def scan_from(file: SafeFile, most: int | None = None) -> Scan:
     only_y = axes is not None and not file.has(f"{_DATA}/x")
     along = "y" if only_y or axes == ("y",) else "x"
     arrays = _read_arrays(file, along, reading)
-    if axes is not None and axes[-1] != along:
+    if axes is not None and axes[-1] not in (along, *_POINTS):
         arrays |= {name: arrays[name].T for name in arrays.keys() & _AS_SIGNAL}
     # Each point has the number of its pass; elsewhere ``repeat`` only counts rows.
     repeat = file.array(f"{_DATA}/repeat") if points and file.has(f"{_DATA}/repeat") else None
@@ -166,8 +169,12 @@ def _read_arrays(file: SafeFile, along: str, reading: Reading) -> Values:
             ndim = len(quantity.axes) if name in _OWN_SHAPE else None
             dimension = quantity.read_in(reading).dimension
             arrays[name] = file.require_array(path, dimension, ndim=ndim)
-    ceiling = arrays.pop("reading_high", None)
-    if ceiling is not None:
+    for name, ending in _LAYOUTS:
+        x, y = (arrays.pop(f"layout_{axis}{ending}", np.nan) for axis in "xy")
+        if np.ndim(x) or np.ndim(y):
+            arrays[name] = np.column_stack(np.broadcast_arrays(x, y))
+    if "reading_high" in arrays and "sensors" not in arrays:
+        ceiling = file.only_number(f"{_DATA}/reading_high", arrays.pop("reading_high"))
         arrays["u_zz"], number = without_clipped(arrays["u_zz"], ceiling)
         arrays["at_ceiling"] = arrays.get("at_ceiling", 0) + number
     return arrays
@@ -226,20 +233,27 @@ def _data_group(scan: Scan) -> Group:
     forms = {"points": _POINTS, "line": (along,), "repeats": ("repeat", along)}
     axes = forms.get(scan.kind, ("y", "x"))
     data: Nodes = {"point": writer.index_axis("point", scan.x.size)} if points else {}
+    if scan.sensors:
+        data["sensor"] = writer.index_axis("sensor", len(scan.sensors))
     data |= _nodes(scan, axes if points else ("y",), y=scan.y)
     if scan.repeat is not None:
         data["repeat"] = writer.Number(scan.repeat, "1", axes)
     elif scan.kind == "repeats":
-        data["repeat"] = writer.index_axis("repeat", scan.u_zz.shape[0])
+        data["repeat"] = writer.index_axis("repeat", scan.shape[0])
     if scan.branch is not None:
         data["branch"] = writer.Number(scan.branch, "1", axes, {"meaning": _BRANCHES})
     positions = {along: scan.x, f"{along}_errors": scan.x_errors}
     data |= _nodes(scan, axes if points else (along,), **positions)
     # What was at the end of the range is missing.
     stated = dict(vars(scan))
-    for name in ("line_offset", "position_errors_by_repeat", "at_ceiling"):
+    for name in ("line_offset", "position_errors_by_repeat", "at_ceiling", "sensors"):
         stated[name] = stated[name] or None
-    data |= write_record(records.TAKEN_FOR_GRANTED, stated).children
+    for name, ending in _LAYOUTS:
+        if stated[name] is not None:
+            x, y = stated[name].T
+            stated |= {f"layout_x{ending}": x, f"layout_y{ending}": y}
+    data |= write_record(records.TAKEN_FOR_GRANTED.read_in(scan.reading), stated).children
+    data |= _nodes(scan, (), reading_high=scan.reading_high)
     data |= _nodes(scan, axes, u_zz=scan.u_zz)
     if scan.u_zz_correlation is not None:
         pairs = zip(_PAIRS, scan.u_zz_correlation.shape, strict=True)
@@ -247,6 +261,7 @@ def _data_group(scan: Scan) -> Group:
         data |= _nodes(scan, _PAIRS, u_zz_correlation=scan.u_zz_correlation)
     like_signal = {name: getattr(scan, name) for name in LIKE_SIGNAL}
     data |= _nodes(scan, axes, **like_signal, **scan.channels)
+    axes = (*_SENSOR, *axes)[-scan.u_zz.ndim :]
     return Group("NXdata", data, {"signal": "u_zz", "axes": axes})
 
 
@@ -256,8 +271,13 @@ def _rest_group(record: Scan) -> Group:
 
 
 def _nodes(scan: Scan, axes: tuple[str, ...], **arrays: FloatArray | None) -> Nodes:
+    """Return arrays along some axes; those with one more run along the sensors, too."""
     return {
-        name: si(array, _DECLARED[name].read_in(scan.reading).dimension, axes)
+        name: si(
+            array,
+            _DECLARED[name].read_in(scan.reading).dimension,
+            (*_SENSOR, *axes)[-array.ndim :],
+        )
         for name, array in arrays.items()
         if array is not None
     }
@@ -266,11 +286,14 @@ def _nodes(scan: Scan, axes: tuple[str, ...], **arrays: FloatArray | None) -> No
 def _find_axes(file: SafeFile) -> tuple[str, ...] | None:
     """Return the axes of the readings as they are stored; none where the shape alone tells them."""
     shape = file.array(_SIGNAL).shape if file.has(_SIGNAL) else ()
+    several = file.has(f"{_DATA}/sensor_names")
     present = tuple(name for name in "yx" if file.has(f"{_DATA}/{name}"))
     forms = [_POINTS, present[:1]]
-    if len(shape) == 2:
+    if len(shape) - several == 2:
         form = present if len(present) == 2 else ("repeat", *present)
-        forms = [form, form[::-1]]
+        forms = [form] if several else [form, form[::-1]]
+    if several:
+        forms = [(*_SENSOR, *form) for form in forms]
     stated = set(_stated_axes(file, len(shape)))
     fitting = [form for form in forms if stated.issubset(enumerate(form))]
     if not fitting:
@@ -278,12 +301,13 @@ def _find_axes(file: SafeFile) -> tuple[str, ...] | None:
         raise FormatError(
             f"{file.where(_DATA)} states of its axes: {words}.",
             why="A scan is stored along [x], [repeat, x], [y], [repeat, y] or [point], or [y, x] "
-            f"where {_DATA}/y makes it a raster; a square one that is turned would look right.",
+            f"where {_DATA}/y makes it a raster; a square one that is turned would look right. An "
+            f"array of sensors, with names in {_DATA}/sensor_names, has sensor before these.",
             cure="Transpose the data, or correct what states its axes.",
         )
     if len(fitting) == 1:
-        return fitting[0]
-    if shape[:-1] == shape[1:] != ():
+        return fitting[0][several:]
+    if shape[several:-1] == shape[1 + several :] != ():
         raise FormatError(
             f"{file.where(_SIGNAL)} is as long as wide, and nothing states which axis is which.",
             cure=f"Add the attribute axes to {_DATA}, such as {list(form)}.",
@@ -302,7 +326,7 @@ def _stated_axes(file: SafeFile, rank: int) -> Iterator[tuple[int, str]]:
         # A signal may have names of its own for its axes.
         if path == _DATA or not {"x", "y"}.isdisjoint(names):
             yield from enumerate(map(str, names))
-    if rank == 2:  # of points all axes are one
+    if rank > 1:  # of points all axes are one
         for name in ("x", "y", "repeat"):
             index = file.attribute(_DATA, f"{name}_indices")
             if isinstance(index, int):

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from memscal.errors import InputError
 from memscal.extensions import hook
 from memscal.model.arrays import (
+    BoolArray,
     FloatArray,
     IndexArray,
     Values,
@@ -36,6 +37,9 @@ from memscal.model.stress import StressProfile
 
 LIKE_SIGNAL = ("u_zz_errors", "normal_load", "normal_load_errors", "time")
 """Arrays of a scan that have the shape of its readings, where they are stated."""
+
+OF_SENSORS = ("layout", "layout_uncertainty", "used", "reading_low", "reading_high", "board")
+"""What the scan of an array may state of its sensors; one value is that of each of them."""
 
 LUBRICATIONS = ("", "dry", "lubricated")
 """States of lubrication; empty where a scan states none."""
@@ -69,6 +73,18 @@ def require_rod_friction(friction: float | None) -> None:
             f"The rod's friction is {friction:g}.",
             why="Only a rod that slides freely or sticks is solved at finite strain.",
             cure="Give 0 or inf, or leave it out: the difference is then counted.",
+        )
+
+
+def require_single(scan: Scan) -> None:
+    """Refuse the scan of an array where that of one sensor is meant."""
+    if scan.sensors:
+        raise InputError(
+            f"{scan.source.file_name if scan.source else 'The scan'} is that of an array of "
+            f"{len(scan.sensors)} sensors.",
+            why="What a sensor reads of its neighbours changes its A: it is no single sensor.",
+            cure="Calibrate the array (memscal calibrate, memscal.calibrate_array), and locate "
+            "contacts (memscal locate). The scan of one sensor by itself is scan.of_sensor(i).",
         )
 
 
@@ -216,6 +232,10 @@ class Scan:
     points    (n,)          none     (n,)        readings along a line, in passes
     ========= ============= ======== =========== =================================
 
+    ``sensors`` make it the scan of an array under one film: the first axis of ``u_zz`` is then the
+    sensor, before those of the table.  Positions, loads, branch and time have no such axis: one
+    press is one press.
+
     Parameters
     ----------
     x : ndarray, shape (n,)
@@ -240,7 +260,8 @@ class Scan:
         that is not known; the words ``"approach"`` and ``"retreat"``, and one value for each row
         of a ``u_zz`` of two axes, are accepted.
     u_zz_errors : ndarray, shape of ``u_zz``, optional
-        Standard uncertainty of each voltage (electronic noise), in V.
+        Standard uncertainty of each voltage (electronic noise), in V; of an array also one value
+        for each sensor.
     normal_load, normal_load_errors : ndarray, shape of ``u_zz``, optional
         Load at each point where it was recorded, and its standard uncertainty, independent from
         point to point, in N.
@@ -314,6 +335,13 @@ class Scan:
     indenter: RoundIndenter | None = None
     film: ElasticFilm | None = None
     unit: str = "V"
+    sensors: Sequence[str] = ()
+    layout: FloatArray | None = None
+    layout_uncertainty: FloatArray | float | None = None
+    used: BoolArray | None = None
+    reading_low: FloatArray | None = None
+    reading_high: FloatArray | None = None
+    board: FloatArray | None = None
     sensor: StressSensor = field(default_factory=StressSensor)
     load_cell: LoadCell = field(default_factory=LoadCell)
     stage: Equipment = field(default_factory=Equipment)
@@ -357,6 +385,9 @@ class Scan:
     source: SourceFile | None = None
 
     def __post_init__(self) -> None:
+        if any(getattr(self, name) is not None for name in OF_SENSORS) or len(self.sensors):
+            self._freeze_array()
+            return
         self._freeze_positions()
         object.__setattr__(self, "u_zz", frozen_array(self.u_zz))
         self._check_signal_shape()
@@ -396,12 +427,14 @@ class Scan:
 
     def __repr__(self) -> str:
         """Return what was scanned in place of thousands of array elements."""
-        shape = " x ".join(map(str, self.u_zz.shape))
+        shape = " x ".join(map(str, self.shape))
         form = shape if self.kind == "points" else f"{self.kind}, {shape}"
         reach = f"{self.x.min() * 1e3:.4g} to {self.x.max() * 1e3:.4g} mm"
         if self.motion == "rest":
             return f"<{type(self).__name__}: noise record, {shape} readings>"
         load = "no load stated" if self.load is None else f"load {self.load:.4g} N"
+        if self.sensors:
+            load = f"{load}, {len(self.sensors)} sensors"
         return f"<{type(self).__name__}: {form} points, x from {reach}, {load}>"
 
     @property
@@ -442,9 +475,22 @@ class Scan:
         return Reading.fitting(self.unit, np.nanmax(np.abs(self.u_zz), initial=0.0))
 
     @property
+    def shape(self) -> tuple[int, ...]:
+        """Shape of the readings of one sensor."""
+        return self.u_zz.shape[bool(self.sensors) :]
+
+    def of_sensor(self, i: int) -> Scan:
+        """Return the scan of one sensor of an array, counted from 0, by itself."""
+        own: Values = dict.fromkeys(OF_SENSORS)
+        if self.u_zz_errors is not None:
+            own["u_zz_errors"] = self.u_zz_errors[i]
+        sensor = replace(self.sensor, name=self.sensors[i])
+        return replace(self, u_zz=self.u_zz[i], sensors=(), sensor=sensor, **own)
+
+    @property
     def kind(self) -> str:
         """``"line"``, ``"repeats"``, ``"raster"`` or ``"points"``."""
-        if self.u_zz.ndim == 1:
+        if len(self.shape) == 1:
             return "line" if self.y is None and self.repeat is None else "points"
         return "repeats" if self.y is None else "raster"
 
@@ -455,12 +501,12 @@ class Scan:
 
     @property
     def positions(self) -> tuple[FloatArray, FloatArray]:
-        """Position of every voltage along x and y, in m, each like ``u_zz``."""
-        along = np.broadcast_to(self.x, self.u_zz.shape)
+        """Position of every voltage along x and y, in m, each like ``u_zz`` of one sensor."""
+        along = np.broadcast_to(self.x, self.shape)
         if self.y is not None:
-            y = self.y.reshape(-1, *[1] * (self.u_zz.ndim - 1))
+            y = self.y.reshape(-1, *[1] * (len(self.shape) - 1))
             return along, np.broadcast_to(y, along.shape)
-        across = np.full(self.u_zz.shape, self.line_offset)
+        across = np.full(self.shape, self.line_offset)
         return (across, along) if self.direction == "y" else (along, across)
 
     @property
@@ -468,8 +514,8 @@ class Scan:
         """Which pass each voltage belongs to, counted from zero, of the shape of ``u_zz``."""
         if self.repeat is not None:
             return np.unique(self.repeat, return_inverse=True)[1]
-        rows = np.arange(self.u_zz.shape[0]) if self.kind == "repeats" else np.zeros(1, np.intp)
-        return np.broadcast_to(rows.reshape(-1, *[1] * (self.u_zz.ndim - 1)), self.u_zz.shape)
+        rows = np.arange(self.shape[0]) if self.kind == "repeats" else np.zeros(1, np.intp)
+        return np.broadcast_to(rows.reshape(-1, *[1] * (len(self.shape) - 1)), self.shape)
 
     def only_passes(self, numbers: ArrayLike) -> Scan:
         """Return the passes with these numbers (of ``passes``), as a scan of the same kind."""
@@ -478,6 +524,45 @@ class Scan:
         if self.kind == "repeats":
             return replace(self, **_rows(self, np.atleast_1d(numbers)))
         return only_points(self, np.flatnonzero(np.isin(self.passes, numbers)))
+
+    def _freeze_array(self) -> None:
+        """Freeze what an array states of its sensors, and prove the scan of each by itself."""
+        names = tuple(map(str, self.sensors))
+        number = len(names)
+        u_zz = frozen_array(self.u_zz)
+        different = len({*names, ""}) == number + 1 and not isinstance(self.sensors, str)
+        if not different or u_zz.shape[:1] != (number,):
+            raise InputError(
+                f"The sensors of the scan are {self.sensors!r}, and u_zz has shape {u_zz.shape}.",
+                why="The first axis of the readings of an array is the sensor.",
+                cure="Give a list of names, one for each sensor, all different and none empty.",
+            )
+        if self.motion == "rest" or self.noise_record is not None or self.channels:
+            raise InputError(
+                "The scan of an array has a noise record, or channels xz or yz.",
+                why="Its noise is that of its readings, and each sensor has one channel.",
+                cure="Leave them out; give a further channel as a sensor of its own.",
+            )
+        own: Values = {"sensors": names, "sensor": self.sensor, "u_zz": u_zz}
+        shapes = {"u_zz_errors": u_zz.shape, **dict.fromkeys(OF_SENSORS, (number,))}
+        shapes |= dict.fromkeys(("layout", "layout_uncertainty"), (number, 2))
+        for name, shape in shapes.items():
+            own[name] = stated = getattr(self, name)
+            if stated is None:
+                continue
+            values = frozen_array(stated, dtype=bool if name == "used" else float)
+            whole = values.shape == shape and np.isfinite(values).all()
+            if values.shape != shape[: values.ndim] or (name == "layout" and not whole):
+                raise InputError(
+                    f"{name} of the scan has shape {values.shape}, but it should be {shape}.",
+                    why=f"There are {number} sensors.",
+                    cure="Give finite values of that shape, or leave it out.",
+                )
+            further = [1] * (len(shape) - values.ndim)
+            own[name] = np.broadcast_to(values.reshape(*values.shape, *further), shape)
+        vars(self).update(own)
+        first, *_ = [self.of_sensor(i) for i in range(number)]
+        vars(self).update(vars(first) | own)
 
     def _freeze_positions(self) -> None:
         for name in ("x", "y"):

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
@@ -42,7 +43,10 @@ DEFINITIONS: Mapping[str, tuple[str, Mapping[str, Record], tuple[str, ...]]] = {
     writer.SCAN_SCHEMA: (
         "A sensor's readings against the position of the indenter that is pressed on its film.",
         {
-            "data": records.SCAN_DATA,
+            "data": replace(
+                records.SCAN_DATA,
+                quantities=records.SCAN_DATA.quantities + records.SENSORS.quantities,
+            ),
             **_SCANNED,
             "reference": records.REFERENCE_DATA,
             "synthetic": _ANYTHING,
@@ -198,7 +202,7 @@ def _quantity(group: ET.Element, quantity: Quantity, *, optional: bool) -> None:
             _field(note, "data", "NX_CHAR")
         return
     whole = quantity.key in ("repeat", "branch") or kind == "truth"
-    types = "NX_CHAR" if kind == "text" else "NX_INT" if whole else "NX_FLOAT"
+    types = "NX_CHAR" if kind in ("text", "names") else "NX_INT" if whole else "NX_FLOAT"
     field = _field(group, quantity.key, types, optional=optional)
     if types == "NX_FLOAT":
         field.set("units", _UNITS.get(kind, "NX_ANY"))
