@@ -220,11 +220,6 @@ def _common_kernel(own: JointFit) -> Failing:
     )
 
 
-def _whitened(fit: JointFit) -> FloatArray:
-    """Residuals (m, t) over the sensors' own noise."""
-    return np.asarray(fit.residual / np.sqrt(fit.noise.own)[:, None])
-
-
 def _chi_square(fit: JointFit, array: ArrayData) -> Failing:
     """Compare the residuals of each sensor with the noise: as stated, or between neighbours."""
     presses = fit.model.presses
@@ -261,61 +256,46 @@ def _press_errors(fit: JointFit) -> Failing:
     presses = fit.model.presses
     signals, slopes = fit.model.signals(fit.state)
     towards = fit.model.distances(fit.state)[1]
-    patterns = [fit.state.crosstalk @ (slopes * towards[axis]) for axis in presses.axes]
-    patterns.append(fit.state.crosstalk @ signals)
-    noise = fit.noise
-    covariance = np.diag(noise.own) + np.where(
-        np.equal.outer(presses.board, presses.board), noise.common[presses.board], 0.0
-    )
-    white = np.linalg.cholesky(np.linalg.inv(covariance)).T
+    along = slopes * towards[presses.axes[0]]
+    patterns = ((along, presses.place_errors), (signals, presses.load_errors))
+    white = np.linalg.cholesky(np.linalg.inv(fit.noise.covariance)).T
     residual = white @ fit.residual
-    columns = np.stack([white @ (pattern * presses.keep) for pattern in patterns])
-    # Of each press the share of the residuals that the patterns explain.
-    matrix = np.moveaxis(columns, (0, 1, 2), (2, 1, 0))
-    size = np.linalg.norm(matrix, axis=1, keepdims=True)
-    left = np.linalg.svd(matrix / np.where(size > 0, size, 1.0), full_matrices=False)[0]
-    explained = np.sum((left.mT @ residual.T[:, :, None]) ** 2, axis=(1, 2))
-    # Where errors of place and load are stated, what they make is expected.
-    stated = [presses.place_errors, *([0.0] * (len(presses.axes) - 1)), presses.load_errors]
-    made = sum(np.sum((c * s) ** 2, axis=0) for c, s in zip(columns, stated, strict=True))
-    rank = left.shape[2]
-    degrees = rank * residual.shape[1]
-    value = np.sum(explained / (1 + made / rank))
+    ratios = []
+    for pattern, stated in patterns:
+        changes = white @ (fit.state.crosstalk @ pattern * presses.keep)
+        size = np.sum(changes**2, axis=0)
+        explained = np.sum(changes * residual, axis=0) ** 2 / np.where(size > 0, size, 1.0)
+        ratios.append(np.mean(explained / (1 + stated**2 * size)))
+    count = residual.shape[1]
     return Failing(
         check(
             "press_errors",
-            value / degrees,
-            chdtri(degrees, FALSE_ALARM) / degrees,
-            "What errors of place and load common to a press explain of the residuals, over what "
-            "noise has them explain. A failure means that place or load scatter from press to "
-            "press by more than is stated (x_errors, normal_load_errors).",
-            float(chdtrc(degrees, value)),
+            max(ratios),
+            chdtri(count, FALSE_ALARM / 2) / count,
+            "What an error of place, or of load, common to all sensors explains of the residuals "
+            "of a press, over what noise has it explain. A failure means that place or load "
+            "scatters by more than is stated (x_errors, normal_load_errors).",
         )
     )
 
 
 def _common_mode(fit: JointFit) -> Failing:
     """Test whether pairs of sensors have more, or less, noise in common than a board has."""
-    presses = fit.model.presses
-    white = _whitened(fit)
-    count = np.maximum(presses.keep.astype(float) @ presses.keep.T, 1)
-    common = np.where(
-        np.equal.outer(presses.board, presses.board), fit.noise.common[presses.board], 0.0
-    )
-    expected = common / np.sqrt(np.outer(fit.noise.own, fit.noise.own))
-    total = np.sqrt(np.outer(1 + np.diag(expected), 1 + np.diag(expected)))
-    z = abs(white @ white.T / count - expected) / total * np.sqrt(count)
-    pairs = np.triu_indices(len(white), 1)
-    limit = float(-ndtri(FALSE_ALARM / (2 * pairs[0].size)))
+    keep = fit.model.presses.keep.astype(float)
+    count = np.maximum(keep @ keep.T, 1)
+    scale = np.sqrt(np.diag(fit.noise.covariance))
+    apart = fit.residual @ fit.residual.T / count - fit.noise.covariance
+    z = abs(apart / np.outer(scale, scale)) * np.sqrt(count)
     np.fill_diagonal(z, 0.0)
+    limit = float(-ndtri(FALSE_ALARM / (len(z) * (len(z) - 1))))
     return Failing(
         check(
             "common_mode",
-            z[pairs].max(),
+            z.max(),
             limit,
             "Largest difference of the noise that two sensors have in common from that of their "
-            "board, in standard deviations. A failure means that some sensors share more: state "
-            "their boards, or look for presses that are wrong for several.",
+            "board, in standard deviations. A failure means that some share more: state their "
+            "boards, or look for presses that are wrong for several.",
         ),
         np.flatnonzero(z.max(axis=1) > limit),
     )

@@ -64,6 +64,8 @@ _NEIGHBOURS = 1.3
 _OWN_SHAPES = (SHAPES[0], SHAPES[-2])
 #: Standard deviation of a reading before the noise is known, over the peak.
 _AT_FIRST = 0.01
+#: Rounds of a fit with own shapes; widths alone are a small change, which is linear.
+_OWN_ROUNDS = 4
 #: Readings above this share of a peak count for its place.
 _HIGH = 0.4
 
@@ -348,7 +350,7 @@ def _begun(
         np.zeros((used.sum(), 0)),
         np.zeros(leaking.shape),
     )
-    noise = Noise((_AT_FIRST * peak) ** 2, np.zeros(presses.board.max() + 1))
+    noise = Noise((_AT_FIRST * peak) ** 2, np.zeros((peak.size, peak.size)))
     return _Begun(model, state, noise, gaussian, forward)
 
 
@@ -373,7 +375,8 @@ def _own_fit(fit: JointFit, *, shapes: bool) -> JointFit:
     layout = Layout.of(model.presses, pairs, model.layout.leaks >= 0, largest, own.shape[1])
     state = replace(fit.state, own=np.zeros((fit.state.gain.size, own.shape[1])))
     model = replace(model, layout=layout, own_kernels=own)
-    return fit_shape(model, state, fit.noise, gaussian, fit.forward)
+    rounds = _OWN_ROUNDS if shapes else 1
+    return fit_shape(model, state, fit.noise, gaussian, fit.forward, rounds)
 
 
 def _effects(prepared: Prepared, fit: JointFit) -> Arrays:
@@ -413,10 +416,8 @@ def _array(scan: Scan, prepared: Prepared, found: Sorted, fit: JointFit) -> Sens
     centres = state.centres.copy()
     centres[:, fixed] = np.nan
     width = state.own[:, 0] if state.own.size else np.zeros(used.sum())
-    common = np.where(
-        np.equal.outer(presses.board, presses.board), fit.noise.common[presses.board], 0
-    )
     first = prepared.scans[0]
+    of_baselines = fit.posterior.root[fit.model.layout.drift[:, 0]]
     return SensorArray(
         sensors=scan.sensors,
         used=used,
@@ -426,7 +427,8 @@ def _array(scan: Scan, prepared: Prepared, found: Sorted, fit: JointFit) -> Sens
         estimated=_spread_square(near, used, np.zeros((n, n), bool)),
         gaussian_sigmas=_spread(fit.gaussian.sigma * (1 + width), used),
         baselines=_spread(state.drift[:, 0], used),
-        noise=_spread_square(np.diag(fit.noise.own) + common, used, np.full((n, n), np.nan)),
+        baseline_uncertainties=_spread(np.linalg.norm(of_baselines, axis=1), used),
+        noise=_spread_square(fit.noise.covariance, used, np.full((n, n), np.nan)),
         k=fit.forward.k,
         reference=fit.reference.values,
         kernels=numbers.kernels if len(numbers.kernels) == 1 else _spread(numbers.kernels, used),
@@ -445,6 +447,7 @@ def _array(scan: Scan, prepared: Prepared, found: Sorted, fit: JointFit) -> Sens
             _spread(fit.model.predicted(state), used),
             _spread(state.drift @ presses.drift.T, used),
         ),
+        kernel="own" if state.own.size else "common",
         line_y=first.line_offset,
         layout=scan.layout,
         layout_uncertainty=scan.layout_uncertainty,

@@ -43,6 +43,9 @@ OWN_WIDTH = 0.05
 _OWN_SHAPE = 0.05
 _MOST_ROUNDS = 25
 _SHAPE_ROUNDS = 5
+#: A sensor's own noise is at least this share of its variance, and of its largest reading.
+_LEAST_OWN = 0.02
+_ROUNDING = 1e-7
 #: Steps end below this share of a standard uncertainty.
 _SETTLED = 0.1
 #: The longest step, in ln g or in widths of G.
@@ -221,21 +224,20 @@ def noise_of(presses: Presses, residual: FloatArray, parameters: float) -> Noise
     freedom = np.maximum(1 - parameters / count, 0.1)
     square = residual @ residual.T / np.maximum(both, 1)
     square /= np.sqrt(np.outer(freedom, freedom))
-    common = np.zeros(presses.board.max() + 1)
-    of_board = np.zeros(len(residual))
-    for i in range(common.size):
+    common = np.zeros_like(square)
+    for i in np.unique(presses.board):
         members = np.flatnonzero(presses.board == i)
         if members.size > 1:
             block = square[np.ix_(members, members)]
-            pairs = np.triu_indices(members.size, 1)
-            common[i] = max(np.mean(block[pairs]), 0.0)
-            of_board[members] = common[i]
+            shared = np.mean(block[np.triu_indices(members.size, 1)])
+            common[np.ix_(members, members)] = max(shared, 0.0)
     total = np.diag(square)
     if presses.stated is not None:
         stated = np.sum(presses.stated**2, axis=1, where=presses.keep) / count
         total = np.maximum(total, stated)
-    floor = (1e-7 * np.ptp(presses.u, axis=1)) ** 2
-    return Noise(np.maximum(total - of_board, np.maximum(0.02 * total, floor)), common)
+    floor = (_ROUNDING * np.ptp(presses.u, axis=1)) ** 2
+    least = np.maximum(_LEAST_OWN * total, floor)
+    return Noise(np.maximum(total - np.diag(common), least), common)
 
 
 def fit_array(
@@ -250,12 +252,17 @@ def fit_array(
 
 
 def fit_shape(
-    model: JointModel, state: ArrayState, noise: Noise, gaussian: GaussianFit, forward: ForwardModel
+    model: JointModel,
+    state: ArrayState,
+    noise: Noise,
+    gaussian: GaussianFit,
+    forward: ForwardModel,
+    rounds: int = _SHAPE_ROUNDS,
 ) -> JointFit:
     """Fit an array from a fit with a Gaussian, or one without own kernels."""
     presses = model.presses
     everything = np.eye(len(model.waves.mix))
-    for _ in range(_SHAPE_ROUNDS):
+    for _ in range(rounds):
         about = replace(state, kernel=model.waves.mix @ _gaussian(gaussian))
         data = presses.u - model.predicted(about)
         information = model.information(state, noise, everything, data)

@@ -41,7 +41,12 @@ class Noise:
     """Noise of m sensors: each one's own, and what the sensors of a board have in common."""
 
     own: FloatArray  # (m,): variance, in V^2
-    common: FloatArray  # (boards,): variance, in V^2
+    common: FloatArray  # (m, m): covariance of sensors of one board, in V^2
+
+    @property
+    def covariance(self) -> FloatArray:
+        """Covariance of one reading of each, (m, m), in V^2."""
+        return np.diag(self.own) + self.common
 
 
 @array_record
@@ -231,9 +236,10 @@ class JointModel:
     ) -> FloatArray:
         """What one deviation of each thing in common to a press does, (c, m, t), in V."""
         presses = self.presses
+        deviation = np.sqrt(np.diag(noise.common))
         boards = [
-            np.sqrt(variance) * np.broadcast_to((presses.board == i)[:, None], signals.shape)
-            for i, variance in enumerate(noise.common)
+            np.broadcast_to((deviation * (presses.board == i))[:, None], signals.shape)
+            for i in np.unique(presses.board)
         ]
         errors = [
             presses.place_errors * (state.crosstalk @ -moved),
