@@ -41,7 +41,7 @@ from memscal.extensions.arrays.presses import (
     sorted_readings,
 )
 from memscal.extensions.arrays.sensor_array import SensorArray
-from memscal.formats.opened import opened_array
+from memscal.formats.scan import read_scan
 from memscal.model.arrays import (
     Arrays,
     BoolArray,
@@ -165,7 +165,15 @@ def calibrate_array(
     >>> bool(abs(array.crosstalk[0, 1] - 0.01) < 0.005)
     True
     """
-    opened = opened_array(scan, accept_altered=accept_altered)
+    opened = scan
+    if not isinstance(opened, Scan):
+        opened = read_scan(opened, accept_altered=accept_altered)
+    if not opened.sensors:
+        raise InputError(
+            "The scan is that of a single sensor, not of an array.",
+            why="An array states the names of its sensors (Scan.sensors, memscal import --u 'u_*').",
+            cure="Calibrate it with memscal.calibrate.",
+        )
     require_names("There is no kernel", [kernel], KernelModel.__args__)
     if kernel == "measured":
         from memscal.extensions.arrays.measured_fields import measured_array
@@ -241,7 +249,6 @@ def _presses(
     used = found.used
     keep = found.keep[used] & np.isfinite(loads)
     x_errors = np.zeros(scan.x.size) if scan.x_errors is None else scan.x_errors
-    shape = scan.u_zz.shape[1:]
     axes = (0, 1) if single.planar else ((0,) if single.direction == "x" else (1,))
     drift = [np.ones(u.shape[1])]
     for axis in axes:
@@ -249,7 +256,7 @@ def _presses(
         drift.append((places[axis] - places[axis].min()) / half - 1)
     stated = scan.u_zz_errors
     if stated is not None:
-        stated = np.broadcast_to(stated.reshape(len(u), -1), u.shape)[used]
+        stated = stated.reshape(u.shape)[used]
     board = np.zeros(len(u), np.intp) if scan.board is None else scan.board
     return Presses(
         places=places,
@@ -258,7 +265,7 @@ def _presses(
         keep=keep,
         drift=np.stack(drift, axis=1),
         axes=axes,
-        place_errors=np.broadcast_to(x_errors, shape).ravel(),
+        place_errors=np.broadcast_to(x_errors, scan.shape).ravel(),
         load_errors=np.where(np.isfinite(errors), errors, 0.0),
         board=np.unique(board[used], return_inverse=True)[1],
         stated=stated,
@@ -417,6 +424,7 @@ def _array(scan: Scan, prepared: Prepared, found: Sorted, fit: JointFit) -> Sens
     centres[:, fixed] = np.nan
     width = state.own[:, 0] if state.own.size else np.zeros(used.sum())
     first = prepared.scans[0]
+    spread = scan.layout_uncertainty
     of_baselines = fit.posterior.root[fit.model.layout.drift[:, 0]]
     return SensorArray(
         sensors=scan.sensors,
@@ -450,7 +458,7 @@ def _array(scan: Scan, prepared: Prepared, found: Sorted, fit: JointFit) -> Sens
         kernel="own" if state.own.size else "common",
         line_y=first.line_offset,
         layout=scan.layout,
-        layout_uncertainty=scan.layout_uncertainty,
+        layout_uncertainty=None if spread is None else float(np.mean(spread**2) ** 0.5),
         reading_low=scan.reading_low,
         reading_high=scan.reading_high,
         reading=prepared.reading,
