@@ -1,11 +1,15 @@
 """Arrays of sensors of which everything is known, and what an independent layer makes them read."""
 
+from functools import cache
+
 import numpy as np
 
-from memscal.axisymmetry.hankel import Wavenumbers
+from memscal.axisymmetry.hankel import Wavenumbers, hankel_transform
 from memscal.axisymmetry.kernels import gaussian_transfer
 from memscal.extensions.arrays.array_data import ArrayReadings, KernelModes
 from memscal.extensions.arrays.sensor_array import SensorArray
+from memscal.mechanics.contact import Contact
+from memscal.mechanics.indent import indent
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Rod
 from memscal.model.provenance import Process
@@ -28,6 +32,17 @@ def near(places: np.ndarray) -> np.ndarray:
     apart = np.hypot(*(places[:, None] - places).T)
     np.fill_diagonal(apart, np.inf)
     return apart < 1.3 * apart.min()
+
+
+@cache
+def _rod() -> Contact:
+    return indent(FILM, ROD, load=1.0)
+
+
+def rod_stress(k: np.ndarray) -> np.ndarray:
+    """Transform of the base stress under the rod, over its load, at wavenumbers in rad/m."""
+    r = np.linspace(0.0, 40e-3, 4001)
+    return hankel_transform(r, _rod().base_stress(r), k)
 
 
 def known_array(
@@ -67,6 +82,7 @@ def known_array(
         k=k,
         kernels=gaussian_transfer(k, sigma)[None],
         modes=KernelModes(np.zeros((0, k.size)), np.zeros(0, np.intp)),
+        reference=rod_stress(k),
         root=root,
         effects={},
         film=FILM,

@@ -19,9 +19,9 @@ from functools import cached_property
 
 import numpy as np
 
+from memscal.axisymmetry.hankel import hankel_transform
 from memscal.axisymmetry.kernels import gaussian_transfer_slope
 from memscal.model.arrays import (
-    TINY,
     BoolArray,
     FloatArray,
     IndexArray,
@@ -38,6 +38,8 @@ from memscal.model.provenance import Process
 
 #: Owner of a mode that changes the kernels of all sensors.
 ALL = -1
+#: Radii at which G is shown, in widths of its Gaussian.
+RADII = np.linspace(0.0, 8.0, 161)
 
 
 @array_record
@@ -159,18 +161,24 @@ class ArrayData(Checked):
         errors[self.estimated] = self.split(self.uncertainties())[3]
         return errors
 
+    def radial(self, transforms: FloatArray, r: FloatArray) -> FloatArray:
+        """Return what has the transforms (nodes,) or (nodes, m) at radii in m."""
+        return hankel_transform(self.k, transforms, r) / (2 * np.pi) ** 2
+
+    def kernel_of(self, i: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return a sensor's transform of G, its changes by modes, and the modes' root."""
+        own = (self.modes.owner == ALL) | (self.modes.owner == i)
+        kernel = self.kernels[i if len(self.kernels) > 1 else 0]
+        return kernel, self.modes.changes[own], self.split(self.columns)[4][own]
+
     @property
-    def sigma_uncertainties(self) -> FloatArray:
-        """Standard uncertainties of the widths of the Gaussians nearest to each G, (n,), in m."""
+    def sigma_columns(self) -> FloatArray:
+        """Changes of the widths of the Gaussians nearest to each G, (n, c), in m."""
         # Nearest in the plane: by Parseval's theorem the squares of transforms count by k dk.
         area = self.k * np.gradient(self.k)
-        slopes = np.array(
-            [gaussian_transfer_slope(self.k, sigma) for sigma in self.gaussian_sigmas]
-        )
-        slopes = np.nan_to_num(slopes)
-        size = np.sum(area * slopes**2, axis=1)
-        by_mode = (area * slopes) @ self.modes.changes.T / np.maximum(size, TINY)[:, None]
-        owners = np.arange(len(self.sensors))[:, None]
-        by_mode = np.where((self.modes.owner == ALL) | (self.modes.owner == owners), by_mode, 0.0)
-        errors = np.linalg.norm(by_mode @ self.split(self.columns)[4], axis=1)
-        return np.where(self.used, errors, np.nan)
+        changes = np.full((len(self.sensors), self.columns.shape[1]), np.nan)
+        for i in np.flatnonzero(self.used).tolist():
+            slope = gaussian_transfer_slope(self.k, self.gaussian_sigmas[i])
+            _, by_mode, root = self.kernel_of(i)
+            changes[i] = (by_mode @ (area * slope) / np.sum(area * slope**2)) @ root
+        return changes

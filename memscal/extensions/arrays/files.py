@@ -9,9 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from memscal.axisymmetry.hankel import hankel_transform
 from memscal.errors import FormatError
-from memscal.extensions.arrays.array_data import ArrayData, ArrayReadings, KernelModes
+from memscal.extensions.arrays.array_data import RADII, ArrayData, ArrayReadings, KernelModes
 from memscal.formats import groups
 from memscal.formats.digest import require_schema, require_unaltered
 from memscal.formats.files import FilePath
@@ -24,8 +23,6 @@ from memscal.model.arrays import Values
 from memscal.model.indenter import Rod
 from memscal.model.quantities import Quantity, Record, record
 
-#: Radii in widths of the widest G at which G is written, for people.
-_RADII = np.linspace(0.0, 8.0, 161)
 _U_ZZ = "/entry/reconvolution/u_zz"
 
 
@@ -63,7 +60,7 @@ def _stated(data: ArrayData) -> Values:
     """Return what the groups hold, by the names of their records."""
     deviation = np.sqrt(np.diag(data.noise))
     scale = np.outer(deviation, deviation)
-    radii = _RADII * np.nanmax(data.gaussian_sigmas)
+    radii = RADII * np.nanmax(data.gaussian_sigmas)
     stated = {
         **data.stated(),
         **vars(data.modes),
@@ -72,12 +69,12 @@ def _stated(data: ArrayData) -> Values:
         "names": to_json(data.sensors),
         "reference_unit": data.reading.per,
         "conversion_constants_uncertainty": np.sqrt(np.diag(data.covariance)),
-        "gaussian_sigma_errors": data.sigma_uncertainties,
+        "gaussian_sigma_errors": np.linalg.norm(data.sigma_columns, axis=1),
         "c_errors": data.crosstalk_uncertainties,
         "deviation": deviation,
         "correlation": np.divide(data.noise, scale, out=np.zeros_like(scale), where=scale != 0),
         "r": radii,
-        "g": hankel_transform(data.k, np.nan_to_num(data.kernels).T, radii).T / (2 * np.pi) ** 2,
+        "g": data.radial(np.nan_to_num(data.kernels).T, radii).T,
     }
     stated["centre_x"], stated["centre_y"] = data.centres.T
     stated["centre_x_errors"], stated["centre_y_errors"] = data.centre_uncertainties.T

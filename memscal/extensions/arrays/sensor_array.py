@@ -3,9 +3,11 @@
 from dataclasses import field
 from os import PathLike
 
+from memscal.apparatus import ApparatusFunction
 from memscal.errors import FormatError
 from memscal.extensions.arrays import files
 from memscal.extensions.arrays.array_data import ArrayData
+from memscal.extensions.arrays.single_sensor import single_sensor
 from memscal.formats.hdf5.reader import open_hdf5
 from memscal.formats.hdf5.writer import ARTIFACT_SCHEMA, SCHEMA_ATTRIBUTE
 from memscal.model.arrays import keyword_array_record
@@ -39,6 +41,34 @@ class SensorArray(ArrayData, Shown):
     def __repr__(self) -> str:
         """Return how many sensors there are, in place of arrays."""
         return f"<SensorArray: {len(self.sensors)} sensors, {self.used.sum()} used>"
+
+    def sensor(self, name: str) -> ApparatusFunction:
+        """Return one sensor as an ordinary apparatus function, to measure or to be saved.
+
+        Its A, G, centre and width have the uncertainties of the array by all sources; its readings
+        are those of the scan less what it reads of the other sensors; its checks are those of the
+        array, without what other sensors alone fail.
+
+        Parameters
+        ----------
+        name : str
+            One of ``sensors``.
+
+        Raises
+        ------
+        InputError
+            If there is no such sensor, or it is not used.
+
+        Examples
+        --------
+        >>> import memscal
+        >>> scan = memscal.simulate(array=(1, 3), pitch=2e-3, crosstalk=0.01, seed=1)
+        >>> array = memscal.calibrate_array(scan).array
+        >>> apparatus = array.sensor(array.sensors[1])
+        >>> apparatus.conversion_constant == array.conversion_constants[1]
+        True
+        """
+        return single_sensor(self, name)
 
     def save(self, path: str | PathLike[str], *, overwrite: bool = False) -> None:
         """Write the array to an artifact file.
