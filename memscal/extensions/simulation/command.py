@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from inspect import signature
@@ -50,6 +51,17 @@ _LOADS = (0.34, 0.69, 1.37, 2.75)
 
 
 _POSITIONS = click.IntRange(min=2, max=4096)
+
+
+def _rows_and_columns(_: Any, __: Any, text: str | None) -> tuple[int, int] | None:
+    """Return both numbers of a text such as 4x4."""
+    if text is None:
+        return None
+    sizes = re.fullmatch(r"(\d{1,9})x(\d{1,9})", text)
+    if sizes is None:
+        raise click.BadParameter(f"{text!r} is not rows x columns, such as 4x4.")
+    return int(sizes[1]), int(sizes[2])
+
 
 _sphere_options = options_of(
     option("--lubricated-load lubricated_loads", Quantity("N"), (0.69, 2.75), multiple=True)(
@@ -128,12 +140,19 @@ def _print_truth(scans: Mapping[Path, Scan], title: str) -> None:
         ("kind", *(scan.kind for scan in scans.values())),
         ("points", *(" x ".join(map(str, scan.u_zz.shape)) for scan in scans.values())),
     ]
+    sensors = [sensor for scan in scans.values() for sensor in scan.sensors]
     for name in names:
+        if name.rpartition("_")[2] in sensors:
+            continue
         words = next(_entry(name, truth[name])[0] for truth in truths if name in truth)
         values = (_entry(name, truth[name])[1] if name in truth else "-" for truth in truths)
         rows.append((words, *values))
     head = ("", *(path.name if len(scans) > 1 else "" for path in scans))
-    emit_tables(Table(f"Synthetic {title} (calculated, not measured) and its truth", head, rows))
+    known = [[s, *(_entry(n, truths[0][f"{n}_{s}"])[1] for n in _OF_SENSORS)] for s in sensors]
+    emit_tables(
+        Table(f"Synthetic {title} (calculated, not measured) and its truth", head, rows),
+        Table("Sensors of the array", ("", "A", "x", "y"), known),
+    )
 
 
 def _described(scan: Scan, path: Path) -> Options:
@@ -165,12 +184,17 @@ def _entry(name: str, value: float | str) -> tuple[str, str]:
 def _quantity(name: str) -> quantities.Quantity:
     from memscal.model.quantities import TRUTH, estimated_quantity
 
-    if name.startswith("load_") and name.removeprefix("load_").isdigit():
-        return replace(TRUTH["load"], words=f"true load {name.removeprefix('load_')}")
+    # That of a load or of a sensor ends with its number or name.
+    start, _, which = name.rpartition("_")
+    if start in TRUTH and name not in TRUTH:
+        return replace(TRUTH[start], words=f"{TRUTH[start].words} {which}")
     return TRUTH.get(name) or estimated_quantity(name)
 
 
-_ROD_NAMES = ("half_range", "raster", "lab")
+_OF_SENSORS = ("conversion_constant", "centre", "centre_y")
+"""What a truth knows of each sensor of an array."""
+
+_ROD_NAMES = ("half_range", "raster", "array", "pitch", "crosstalk", "lab")
 """The options that only a rod scan alone has."""
 
 EXAMPLES = """\b
@@ -181,6 +205,7 @@ Examples:
   memscal simulate -o raster.h5 --raster --points 33 --half-range 6
   memscal simulate -o ring.h5 --sigma 700 --weight 1.5 --sigma 400 --weight -0.5
   memscal simulate -o disc.h5 --disc-radius 800 --sigma 300
+  memscal simulate -o array.h5 --array 4x4 --pitch 2 --crosstalk 0.01
 
 \b
 Examples of an experiment: a rod scan to calibrate with, and a sphere's contacts to measure:
@@ -208,14 +233,27 @@ Examples of an experiment: a rod scan to calibrate with, and a sphere's contacts
 @radius_options(defaults=PAPER)
 @film_options(defaults=PAPER)
 @rod_friction_option(FREE_OR_STUCK)
-@option("--half-range", Quantity("mm"), 8.0)(
-    "Rod scan alone: positions run from minus to plus this, in mm."
+@option("--half-range", Quantity("mm"))(
+    "Rod scan alone: positions run from minus to plus this, in mm.  [default: 8; of an array 2.5 "
+    "film thicknesses beyond its last sensors]"
 )
-@option("--points", _POSITIONS, 65)("Positions of the rod along each axis.")
+@option("--points", _POSITIONS)(
+    "Positions of the rod along each axis.  [default: 65; of an array in steps of an eighth of "
+    "the film's thickness, of a quarter in a raster]"
+)
 @option("--repeats", click.IntRange(min=1, max=4096), 1)(
     "Repeats at each load; with a sphere, of its contacts."
 )
-@option("--raster", is_flag=True)("Rod scan alone: a square instead of a line.")
+@option("--raster", is_flag=True)(
+    "Rod scan alone: a square instead of a line, as several rows of sensors always are."
+)
+@option("--array", "ROWSxCOLUMNS", callback=_rows_and_columns)(
+    "Rod scan alone: rows and columns of sensors under one film, such as 1x10 or 4x4."
+)
+@option("--pitch", Quantity("mm"), 2.0)("Array: distance of neighbouring sensors, in mm.")
+@option("--crosstalk", Quantity("ratio", low=-math.inf), 0.0)(
+    "Array: share of a neighbour's signal that a sensor reads, such as 0.01."
+)
 @option("--noise", NonNegative("percent"), 0.5)(
     "Standard deviation of the noise, in percent of the largest signal."
 )
@@ -288,6 +326,9 @@ def _check_usage(experiment: str, options: Options) -> None:
         other = "sphere" if experiment == "rod" else "rod"
         belongs = "belongs" if len(names) == 1 else "belong"
         raise click.UsageError(f"{', '.join(names)} {belongs} to --experiment {other}.")
+    for name in ("pitch", "crosstalk"):
+        if not options["array"] and context.get_parameter_source(name) == typed:
+            raise click.UsageError(f"--{name} belongs to --array, which says how many sensors.")
     if options["raster"] and max(len(options["loads"]), 1) * options["repeats"] > 1:
         raise click.UsageError("A raster has one repeat at one load.")
     for name in ("loads", "lubricated_loads"):
@@ -327,7 +368,7 @@ def _sphere(folder: Path, options: Options, as_json: bool, force: bool) -> None:
             **settings,
             sphere=sphere,
             interface=interface_of(options),
-            rod_points=options["points"],
+            rod_points=options["points"] or 65,
         )
     scans = {folder / f"{name}.h5": scan for name, scan in made.scans.items()}
     with together(folder):

@@ -10,9 +10,16 @@ from memscal.axisymmetry.kernels import RadialKernel
 from memscal.errors import InputError
 from memscal.extensions.simulation.disturbances import TYPICAL, Disturbances, Shear
 from memscal.extensions.simulation.sensor import blurred_stress, simulated_scan, simulated_sensor
+from memscal.extensions.simulation.sensor_array import MISPLACED, SimulatedArray
 from memscal.friction.family import require_loads
 from memscal.mechanics.press_rod import press_rod
-from memscal.model.arrays import FloatArray, require_non_negative, require_range
+from memscal.model.arrays import (
+    Arrays,
+    FloatArray,
+    Values,
+    require_non_negative,
+    require_range,
+)
 from memscal.model.film import LINEAR, NEO_HOOKEAN, ElasticFilm
 from memscal.model.indenter import Rod
 from memscal.model.scan import Scan
@@ -32,6 +39,11 @@ PAPER_FILM = ElasticFilm(
     law=NEO_HOOKEAN,
 )
 PAPER_ROD = Rod(radius=0.25e-3, radius_uncertainty=2.5e-6)
+#: Where a scan of one sensor ends by default, in m, and its points.
+_REACH = 8e-3
+_POINTS = 65
+#: Where one of an array ends by default, in thicknesses beyond its last sensors.
+_BEYOND = 2.5
 
 
 @reported
@@ -45,10 +57,13 @@ def simulate(
     conversion_constant: float = 1e-7,
     shear: Shear = None,
     load: float | Sequence[float] = 1.0,
-    half_range: float = 8e-3,
-    points: int = 65,
+    half_range: float | None = None,
+    points: int | None = None,
     repeats: int = 1,
     raster: bool = False,
+    array: tuple[int, int] | None = None,
+    pitch: float = 2e-3,
+    crosstalk: float = 0.0,
     disturbances: Disturbances = TYPICAL,
     seed: int = 0,
 ) -> Scan:
@@ -77,10 +92,20 @@ def simulate(
         as shares of its own largest signal.
     load : float or sequence of float
         Load in N; several loads give one repeat of the scan for each.
-    half_range, points : float, int
-        Positions run from minus to plus ``half_range`` in m, ``points`` along each axis.
+    half_range, points : float, int, optional
+        Positions run from minus to plus ``half_range`` in m, ``points`` along each axis: 65 over
+        8 mm to both sides by default, and of an array to 2.5 thicknesses h beyond its last sensors,
+        in steps of h/8, or of h/4 in a raster.
     repeats, raster : int, bool
-        Repeats at each load; whether to scan a square instead of a line.
+        Repeats at each load; whether to scan a square instead of a line, as several rows of
+        sensors always are.
+    array : tuple of int, optional
+        Rows along y and columns along x of sensors under one film; their names are T01, T02 ...,
+        row by row.  Their constants scatter by 5 %, their centres by 20 um about the layout,
+        which is about ``centre``.
+    pitch, crosstalk : float
+        Of an array: distance of neighbours in m, and what a sensor reads of each neighbour's
+        signal, as a share.
     disturbances : Disturbances
         Noise, offset, drift, position of the sensor, and what the scan states.  Shares are of the
         largest signal that the scan meets, at the (mean) load.
@@ -102,9 +127,24 @@ def simulate(
     >>> scan = simulate(points=33, seed=2)
     >>> scan.u_zz.shape, scan.synthetic["gaussian_sigma"]
     ((33,), 0.000561)
+    >>> several = simulate(array=(1, 3), crosstalk=0.01)
+    >>> several.sensors, several.u_zz.shape
+    (('T01', 'T02', 'T03'), (3, 57))
     """
-    require_range("half_range", half_range, 1e-9, 1.0, "m")
     require_non_negative("seed", seed)
+    several = None
+    reach = _REACH
+    count = _POINTS
+    if array:
+        if shear is not None:
+            raise InputError("The sensors of a simulated array have no tangential channel.")
+        several = SimulatedArray.drawn(array, pitch, crosstalk, disturbances.centre, seed)
+        raster = raster or array[0] > 1
+        reach = float(several.layout.max()) + _BEYOND * film.thickness
+        count = 2 * math.ceil(reach / film.thickness * (4 if raster else 8)) + 1
+    half_range = reach if half_range is None else half_range
+    points = count if points is None else points
+    require_range("half_range", half_range, 1e-9, 1.0, "m")
     if points < 2 or repeats < 1:
         raise InputError("A scan needs two positions and one repeat at least.")
     sensor = simulated_sensor(kernel, conversion_constant, shear)
@@ -121,19 +161,27 @@ def simulate(
     contacts = [press_rod(true, rod, value, rod_friction) for value in solved]
 
     x = np.linspace(-half_range, half_range, points)
-    offset = x - disturbances.centre[0]
-    across = (x if raster else np.zeros(1)) - disturbances.centre[1]
-    distance = np.hypot.outer(across, offset)
 
-    def blurred(kernel: RadialKernel, order: int) -> FloatArray:
-        stress = blurred_stress(contacts, kernel, distance, order=order)
-        stress = stress * (loads / solved)[:, None, None]
-        return stress[0] if raster else np.repeat(stress[:, 0], repeats, axis=0)
+    def seen(centre: Sequence[float]) -> Arrays:
+        offset = x - centre[0]
+        across = (x if raster else np.zeros(1)) - centre[1]
+        distance = np.hypot.outer(across, offset)
 
-    stresses = sensor.stresses(blurred, offset, distance)
+        def blurred(kernel: RadialKernel, order: int) -> FloatArray:
+            stress = blurred_stress(contacts, kernel, distance, order=order)
+            stress = stress * (loads / solved)[:, None, None]
+            return stress[0] if raster else np.repeat(stress[:, 0], repeats, axis=0)
+
+        return sensor.stresses(blurred, offset, distance)
+
+    if several:
+        stresses = {"zz": several.read(np.stack([seen(c)["zz"] for c in several.centres]))}
+    else:
+        stresses = seen(disturbances.centre)
     stress = stresses["zz"]
     row_loads = np.repeat(loads, repeats)
-    shape = x.shape if not raster and row_loads.size == 1 else stress.shape
+    row = stress.shape[-2:] if raster or row_loads.size > 1 else x.shape
+    shape = (len(several.layout), *row) if several else row
     states_law = disturbances.state_law
     truth: dict[str, float | str | None] = {
         "centre": disturbances.centre[0],
@@ -143,10 +191,15 @@ def simulate(
         "mooney_rivlin_ratio": film.mooney_rivlin_ratio,
         "rod_friction": rod_friction,
     }
+    stated: Values = {}
+    if several:
+        truth |= several.truth(conversion_constant)
+        stated = {"sensors": several.sensors, "layout": several.layout}
+        stated["layout_uncertainty"] = MISPLACED
     return simulated_scan(
         sensor,
         stresses,
-        float(stress.max() if raster else stress.max(axis=1).mean()),
+        float(stress.max() if raster else stress.max(axis=-1).mean(axis=-1).max()),
         np.random.default_rng(seed).standard_normal(shape),
         disturbances,
         seed,
@@ -154,11 +207,12 @@ def simulate(
         loads=loads,
         truth={name: value for name, value in truth.items() if value is not None},
         y=x if raster else None,
-        normal_load=np.broadcast_to(row_loads[:, None], shape) if loads.size > 1 else None,
+        normal_load=np.broadcast_to(row_loads[:, None], row) if loads.size > 1 else None,
         indenter=rod,
         rod_friction=rod_friction if states_law else None,
         film=film if states_law else without_law(film),
         title="Synthetic rod scan",
+        **stated,
     )
 
 
