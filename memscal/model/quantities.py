@@ -248,7 +248,7 @@ TRUTH = ESTIMATED | by_name(
         Quantity("load_scatter", _ONE, "scatter of the loads", shown="percent"),
         Quantity("position_error", _L, "scatter of the positions", shown="um"),
         Quantity("gain", _ONE, "gain against the rod scan"),
-        Quantity("crosstalk", _ONE, "crosstalk of neighbours", shown="percent"),
+        Quantity("crosstalk", _ONE, "crosstalk of neighbours"),
         Quantity("seed", _ONE, "seed"),
     )
 )

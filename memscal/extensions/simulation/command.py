@@ -131,7 +131,9 @@ def _arguments(function: Callable[..., Any], options: Options) -> Options:
 
 
 def _print_truth(scans: Mapping[Path, Scan], title: str) -> None:
-    """Print the truth of scans, one column for each."""
+    """Print the truth of scans, one column for each, and of the sensors of an array."""
+    from memscal.extensions.simulation.sensor_array import OF_SENSORS
+
     truths = [dict(scan.synthetic or {}) for scan in scans.values()]
     names: dict[str, None] = {}
     for truth in sorted(truths, key=len, reverse=True):
@@ -140,7 +142,7 @@ def _print_truth(scans: Mapping[Path, Scan], title: str) -> None:
         ("kind", *(scan.kind for scan in scans.values())),
         ("points", *(" x ".join(map(str, scan.u_zz.shape)) for scan in scans.values())),
     ]
-    sensors = [sensor for scan in scans.values() for sensor in scan.sensors]
+    sensors = [name.lower() for scan in scans.values() for name in scan.sensors]
     for name in names:
         if name.rpartition("_")[2] in sensors:
             continue
@@ -148,7 +150,9 @@ def _print_truth(scans: Mapping[Path, Scan], title: str) -> None:
         values = (_entry(name, truth[name])[1] if name in truth else "-" for truth in truths)
         rows.append((words, *values))
     head = ("", *(path.name if len(scans) > 1 else "" for path in scans))
-    known = [[s, *(_entry(n, truths[0][f"{n}_{s}"])[1] for n in _OF_SENSORS)] for s in sensors]
+    known = [
+        [s.upper(), *(_entry(n, truths[0][f"{n}_{s}"])[1] for n in OF_SENSORS)] for s in sensors
+    ]
     emit_tables(
         Table(f"Synthetic {title} (calculated, not measured) and its truth", head, rows),
         Table("Sensors of the array", ("", "A", "x", "y"), known),
@@ -190,9 +194,6 @@ def _quantity(name: str) -> quantities.Quantity:
         return replace(TRUTH[start], words=f"{TRUTH[start].words} {which}")
     return TRUTH.get(name) or estimated_quantity(name)
 
-
-_OF_SENSORS = ("conversion_constant", "centre", "centre_y")
-"""What a truth knows of each sensor of an array."""
 
 _ROD_NAMES = ("half_range", "raster", "array", "pitch", "crosstalk", "lab")
 """The options that only a rod scan alone has."""

@@ -10,7 +10,7 @@ from memscal.axisymmetry.kernels import RadialKernel
 from memscal.errors import InputError
 from memscal.extensions.simulation.disturbances import TYPICAL, Disturbances, Shear
 from memscal.extensions.simulation.sensor import blurred_stress, simulated_scan, simulated_sensor
-from memscal.extensions.simulation.sensor_array import MISPLACED, SimulatedArray
+from memscal.extensions.simulation.sensor_array import MISPLACED, simulated_array
 from memscal.friction.family import require_loads
 from memscal.mechanics.press_rod import press_rod
 from memscal.model.arrays import (
@@ -89,7 +89,7 @@ def simulate(
         A, in V/Pa.
     shear : tuple of RadialKernel and float, optional
         G and A (V/Pa) of the tangential channel along x: adds ``u_xz``, with the same disturbances
-        as shares of its own largest signal.
+        as shares of its own largest signal.  Not of an array.
     load : float or sequence of float
         Load in N; several loads give one repeat of the scan for each.
     half_range, points : float, int, optional
@@ -136,9 +136,7 @@ def simulate(
     reach = _REACH
     count = _POINTS
     if array:
-        if shear is not None:
-            raise InputError("The sensors of a simulated array have no tangential channel.")
-        several = SimulatedArray.drawn(array, pitch, crosstalk, disturbances.centre, seed)
+        several = simulated_array(array, pitch, crosstalk, disturbances.centre, seed)
         raster = raster or array[0] > 1
         reach = float(several.layout.max()) + _BEYOND * film.thickness
         count = 2 * math.ceil(reach / film.thickness * (4 if raster else 8)) + 1
@@ -174,14 +172,15 @@ def simulate(
 
         return sensor.stresses(blurred, offset, distance)
 
+    centres = several.centres if several else [disturbances.centre]
+    every = [seen(centre) for centre in centres]
+    stresses = every[0]
     if several:
-        stresses = {"zz": several.read(np.stack([seen(c)["zz"] for c in several.centres]))}
-    else:
-        stresses = seen(disturbances.centre)
+        stresses = {n: several.read(np.stack([each[n] for each in every])) for n in stresses}
     stress = stresses["zz"]
     row_loads = np.repeat(loads, repeats)
     row = stress.shape[-2:] if raster or row_loads.size > 1 else x.shape
-    shape = (len(several.layout), *row) if several else row
+    shape = (*stress.shape[:-2], *row)
     states_law = disturbances.state_law
     truth: dict[str, float | str | None] = {
         "centre": disturbances.centre[0],
