@@ -13,8 +13,15 @@ from memscal.extensions.arrays.array_data import ArrayData
 from memscal.extensions.arrays.array_numbers import array_numbers
 from memscal.extensions.arrays.joint_fit import JointFit
 from memscal.extensions.arrays.presses import Sorted, fitted_layout
-from memscal.model.arrays import BoolArray, FloatArray
-from memscal.model.checks import FALSE_ALARM, Message, QualityCheck, check, override_messages
+from memscal.model.arrays import BoolArray, IndexArray
+from memscal.model.checks import (
+    FALSE_ALARM,
+    Message,
+    QualityCheck,
+    check,
+    chi_square_limit,
+    override_messages,
+)
 from memscal.model.scan import Scan
 
 #: Crosstalk is identified where its median standard uncertainty is at most this.
@@ -30,7 +37,7 @@ class Failing(NamedTuple):
     """A check, and the numbers of the used sensors that fail it."""
 
     check: QualityCheck
-    sensors: FloatArray | tuple[()] = ()
+    sensors: IndexArray | tuple[()] = ()
 
 
 def array_checks(
@@ -112,7 +119,7 @@ def _layout(array: ArrayData) -> Failing:
         check(
             "layout",
             squares.sum(),
-            chdtri(degrees, FALSE_ALARM),
+            chi_square_limit(degrees),
             "Chi-square of the centres against the layout, which may be shifted, turned and "
             "scaled. A failure means that sensors are not where the layout has them, or that "
             "names are mixed up.",
@@ -164,7 +171,8 @@ def _identified(fit: JointFit, near: BoolArray) -> Failing:
 def _models_agree(fit: JointFit, compared: JointFit) -> Failing:
     """Compare A and crosstalk by common and by own shapes: of nested models, as Hausman's test."""
     both = []
-    for each in (fit, compared):
+    # How wide the prior of the crosstalk is may differ between them.
+    for each in (fit.by_widest, compared.by_widest):
         numbers = array_numbers(each, each.posterior, each.posterior.root)
         crosstalk = each.state.crosstalk[each.model.layout.crosstalk >= 0]
         roots = [numbers.of_a, numbers.of_crosstalk[each.model.layout.crosstalk >= 0]]
@@ -211,7 +219,7 @@ def _common_kernel(own: JointFit) -> Failing:
         check(
             "common_kernel",
             square,
-            chdtri(degrees, FALSE_ALARM),
+            chi_square_limit(degrees),
             "Fall of chi-square by widths of the sensors' own, where the common shape is free. A "
             "failure means that one G does not describe all of them.",
             float(chdtrc(degrees, square)),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from os import PathLike
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
 
@@ -48,8 +48,9 @@ from memscal.model.arrays import (
     FloatArray,
     array_record,
 )
-from memscal.model.checks import Checked, QualityCheck, failed_check_messages
+from memscal.model.checks import QualityCheck, failed_check_messages
 from memscal.model.film import LINEAR, FilmLaw
+from memscal.model.indenter import Rod
 from memscal.model.provenance import Process
 from memscal.model.result import Shown
 from memscal.model.scan import Scan
@@ -71,7 +72,7 @@ _HIGH = 0.4
 
 
 @array_record
-class ArrayCalibration(Checked, Shown):
+class ArrayCalibration(Shown):
     """A finished calibration of an array.
 
     Parameters
@@ -99,8 +100,13 @@ class ArrayCalibration(Checked, Shown):
 
     @property
     def checks(self) -> tuple[QualityCheck, ...]:
-        """The checks of the array."""
+        """The quality checks of the array."""
         return self.array.checks
+
+    @property
+    def passed(self) -> bool:
+        """Whether every quality check passed."""
+        return self.array.passed
 
 
 class _Begun(NamedTuple):
@@ -171,10 +177,10 @@ def calibrate_array(
     if not opened.sensors:
         raise InputError(
             "The scan is that of a single sensor, not of an array.",
-            why="An array states the names of its sensors (Scan.sensors, memscal import --u 'u_*').",
+            why="An array names its sensors (Scan(sensors=...), memscal import --u 'u_*').",
             cure="Calibrate it with memscal.calibrate.",
         )
-    require_names("There is no kernel", [kernel], KernelModel.__args__)
+    require_names("There is no kernel", [kernel], get_args(KernelModel))
     if kernel == "measured":
         from memscal.extensions.arrays.measured_fields import measured_array
 
@@ -286,14 +292,15 @@ def _pairs(
             require_names("There is no sensor", [row, column], scan.sensors)
             pairs[scan.sensors.index(row), scan.sensors.index(column)] = row != column
         return pairs
-    require_names("There is no model of crosstalk", [crosstalk], CrosstalkModel.__args__)
+    require_names("There is no model of crosstalk", [crosstalk], get_args(CrosstalkModel))
     apart = ~np.eye(n, dtype=bool)
     if crosstalk == "full":
         return apart
     if crosstalk == "none" or n == 1:
         return np.zeros((n, n), bool)
     distance = np.hypot(*(places[:, None] - places).T)
-    return apart & (distance <= _NEIGHBOURS * np.nanmin(distance[apart]))
+    near: BoolArray = distance <= _NEIGHBOURS * np.nanmin(distance[apart])
+    return apart & near
 
 
 def _all_places(scan: Scan, used: BoolArray, centres: FloatArray) -> FloatArray:
@@ -424,10 +431,12 @@ def _array(scan: Scan, prepared: Prepared, found: Sorted, fit: JointFit) -> Sens
     centres[:, fixed] = np.nan
     width = state.own[:, 0] if state.own.size else np.zeros(used.sum())
     first = prepared.scans[0]
+    rod = first.set_up.indenter
+    assert isinstance(rod, Rod)
     spread = scan.layout_uncertainty
     of_baselines = fit.posterior.root[fit.model.layout.drift[:, 0]]
     return SensorArray(
-        sensors=scan.sensors,
+        sensors=tuple(scan.sensors),
         used=used,
         conversion_constants=_spread(np.exp(numbers.log_a), used),
         centres=_spread(centres, used),
@@ -446,10 +455,11 @@ def _array(scan: Scan, prepared: Prepared, found: Sorted, fit: JointFit) -> Sens
         root=everything[:, :count],
         effects=effects,
         film=first.set_up.film,
-        indenter=first.set_up.indenter,
+        indenter=rod,
         load=first.stated_load,
         readings=ArrayReadings(
-            *presses.places,
+            presses.places[0],
+            presses.places[1],
             presses.load,
             _spread(np.where(presses.keep, presses.u, np.nan), used),
             _spread(fit.model.predicted(state), used),

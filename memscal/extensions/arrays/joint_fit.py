@@ -100,6 +100,13 @@ class JointFit:
         return self.forward.reference
 
     @property
+    def by_widest(self) -> JointFit:
+        """The same by the widest prior of the crosstalk."""
+        change = self.widest.change - self.posterior.change
+        state = self.model.layout.moved(self.state, change, self.model.presses.axes)
+        return replace(self, state=state, posterior=self.widest)
+
+    @property
     def residual(self) -> FloatArray:
         """Readings that are not explained, (m, t), in V; zero where not kept."""
         presses = self.model.presses
@@ -367,7 +374,8 @@ def _root_of(gram: FloatArray) -> FloatArray:
     """Return columns whose products these are."""
     scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
     values, vectors = np.linalg.eigh(gram / np.outer(scale, scale))
-    return np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T * scale
+    root: FloatArray = np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T * scale
+    return root
 
 
 def _reduced(

@@ -174,7 +174,8 @@ class JointModel:
         """What dead sensors of the largest one's gain would read, by kernels (f, q): (s, t, q)."""
         offset = self.presses.places - self.dead[:, :, None]
         profiles = self.waves.profiles(kernels)
-        return self.presses.load[:, None] * profiles(np.hypot(offset[:, 0], offset[:, 1]))
+        volts: FloatArray = profiles(np.hypot(offset[:, 0], offset[:, 1]))
+        return self.presses.load[:, None] * volts
 
     def information(
         self, state: ArrayState, noise: Noise, kernels: FloatArray, data: FloatArray

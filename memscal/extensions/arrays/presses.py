@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from memscal.axisymmetry.hankel import RadialSpectrum, bessel_table, radial_spline
 from memscal.estimation.points import agreeing_tops
-from memscal.model.arrays import ArrayFunction, BoolArray, FloatArray, IndexArray, array_record
+from memscal.model.arrays import BoolArray, FloatArray, IndexArray, array_record
 from memscal.model.scan import Scan
 
 #: Phase (rad) of the last wavenumber from one radius of a table to the next.
@@ -50,7 +52,7 @@ class Waves:
         scale = np.sqrt(radii.size)
         return cls(radii, scale * left[:, seen], size[seen, None] / scale * right[seen])
 
-    def profiles(self, columns: FloatArray) -> ArrayFunction:
+    def profiles(self, columns: FloatArray) -> Any:
         """Functions of the distance (m), (q,) each, of combinations (f, q); a cubic spline."""
         return radial_spline(self.radii, self.values @ columns)
 
