@@ -40,7 +40,7 @@ _PARTS = [quantity.name for quantity in RECORDS["roots"].quantities]
 
 def write_array(data: ArrayData, path: FilePath, *, overwrite: bool = False) -> None:
     """Write an array as a memscal-array file; the same data, the same bytes."""
-    stated = _stated(data)
+    stated = stated_in_file(data)
     film = write_record(records.FILM, data.film)
     children: Nodes = {
         "title": f"Array of {len(data.sensors)} sensors",
@@ -56,7 +56,7 @@ def write_array(data: ArrayData, path: FilePath, *, overwrite: bool = False) -> 
     write_tree(file_tree(ARRAY_SCHEMA, entry), path, overwrite=overwrite)
 
 
-def _stated(data: ArrayData) -> Values:
+def stated_in_file(data: ArrayData) -> Values:
     """Return what the groups hold, by the names of their records."""
     deviation = np.sqrt(np.diag(data.noise))
     scale = np.outer(deviation, deviation)
@@ -68,9 +68,9 @@ def _stated(data: ArrayData) -> Values:
         **dict(zip(_PARTS, data.split(data.columns), strict=True)),
         "names": to_json(data.sensors),
         "reference_unit": data.reading.per,
-        "conversion_constants_uncertainty": np.sqrt(np.diag(data.covariance)),
-        "gaussian_sigma_errors": np.linalg.norm(data.sigma_columns, axis=1),
-        "c_errors": data.crosstalk_uncertainties,
+        "conversion_constants_errors": np.sqrt(np.diag(data.covariance)),
+        "gaussian_sigmas_errors": np.linalg.norm(data.sigma_columns, axis=1),
+        "crosstalk_errors": data.crosstalk_uncertainties,
         "deviation": deviation,
         "correlation": np.divide(data.noise, scale, out=np.zeros_like(scale), where=scale != 0),
         "r": radii,
