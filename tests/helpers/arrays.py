@@ -1,15 +1,17 @@
 """Arrays of sensors of which everything is known, and what an independent layer makes them read."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
 
 from memscal.axisymmetry.hankel import Wavenumbers, hankel_transform
-from memscal.axisymmetry.kernels import gaussian_transfer
-from memscal.extensions.arrays.array_data import ArrayReadings, KernelModes
+from memscal.axisymmetry.kernels import gaussian_transfer, gaussian_transfer_slope
+from memscal.extensions.arrays.array_data import ALL, ArrayReadings, KernelModes
 from memscal.extensions.arrays.sensor_array import SensorArray
 from memscal.mechanics.contact import Contact
 from memscal.mechanics.indent import indent
+from memscal.model.checks import QualityCheck
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Rod
 from memscal.model.provenance import Process
@@ -91,3 +93,33 @@ def known_array(
         readings=ArrayReadings(none, none, none, nothing, nothing, nothing),
         process=Process.of_now(),
     )
+
+
+def full_array(rows=2, columns=3, *, points=50, seed=0, **changes):
+    """Return an array that states everything, with one dead sensor."""
+    rng = np.random.default_rng(seed)
+    array = known_array(rows, columns)
+    n = rows * columns
+    used = np.arange(n) != n - 1
+    # One width of all, and one of the first sensor's own.
+    slope = SIGMA * gaussian_transfer_slope(array.k, SIGMA)
+    modes = KernelModes(np.stack([slope, slope / 2]), np.array([ALL, 0]))
+    parameters = 3 * n + len(array.pairs) + 2
+    place = rng.uniform(-5e-3, 5e-3, (2, points))
+    u = rng.normal(scale=1e-3, size=(3, n, points))
+    stated = {
+        "used": used,
+        "conversion_constants": np.where(used, array.conversion_constants, np.nan),
+        "modes": modes,
+        "root": 1e-3 * rng.normal(size=(parameters, 7)),
+        "effects": {"load": np.full(parameters, -0.01), "thickness": rng.normal(size=parameters)},
+        "readings": ArrayReadings(*place, np.ones(points), *u),
+        "noise": 1e-12 * (np.eye(n) + 0.5),
+        "baseline_uncertainties": np.full(n, 1e-5),
+        "layout": layout(rows, columns) + 1e-5,
+        "layout_uncertainty": 2e-5,
+        "reading_high": np.full(n, 1.0),
+        "checks": (QualityCheck("dead_taxels", 1.0, 0.0, False, "One is dead."),),
+        "failing": {"dead_taxels": ("T05",)},
+    }
+    return replace(array, **(stated | changes))

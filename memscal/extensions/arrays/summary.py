@@ -75,9 +75,9 @@ def _crosstalk_text(array: SensorArray) -> str:
         return (
             f"Crosstalk is {percent(array.crosstalk[found].mean())} on the mean, u of a pair {u}."
         )
-    places = array.places[array.used]
+    places = array.places
     apart = np.hypot(*(places[:, None] - places).T)
-    pitch = apart[apart > 0].min() / array.film.thickness
+    pitch = apart[found].min() / array.film.thickness
     return (
         f"Crosstalk is not identified (u {u}): with a pitch of {pitch:.2g} thicknesses of the film "
         "it looks like another shape of G. Scan a raster, or take a thinner film; A has the u that "
@@ -157,7 +157,8 @@ def dataset(result: Any) -> Dataset:
     stated = SimpleNamespace(**stated_in_file(array))
     variables: Values = {}
     for of in RECORDS.values():
-        variables |= record_arrays(of.read_in(array.reading), stated)
+        held = record_arrays(of.read_in(array.reading), stated)
+        variables |= {name: variable for name, variable in held.items() if variable[0]}
     return xarray.Dataset(variables, {"sensor": list(array.sensors)})
 
 

@@ -5,46 +5,14 @@ from dataclasses import replace
 import h5py
 import numpy as np
 import pytest
-from helpers.arrays import SIGMA, A, known_array
+from helpers.arrays import SIGMA, A, full_array
 from helpers.digests import rewrite_digest
 
 import memscal
-from memscal.axisymmetry.kernels import gaussian_transfer_slope, unit_gaussian
+from memscal.axisymmetry.kernels import unit_gaussian
 from memscal.errors import FormatError, OutputError
-from memscal.extensions.arrays.array_data import ALL, ArrayReadings, KernelModes
 from memscal.formats.inspection import check, describe
-from memscal.model.checks import QualityCheck
 from memscal.model.notation import Reading
-
-
-def full_array(rows=2, columns=3, *, points=50, seed=0, **changes):
-    """Return an array that states everything, with one dead sensor."""
-    rng = np.random.default_rng(seed)
-    array = known_array(rows, columns)
-    n = rows * columns
-    used = np.arange(n) != n - 1
-    # One width of all, and one of the first sensor's own.
-    slope = SIGMA * gaussian_transfer_slope(array.k, SIGMA)
-    modes = KernelModes(np.stack([slope, slope / 2]), np.array([ALL, 0]))
-    parameters = 3 * n + len(array.pairs) + 2
-    place = rng.uniform(-5e-3, 5e-3, (2, points))
-    u = rng.normal(scale=1e-3, size=(3, n, points))
-    stated = {
-        "used": used,
-        "conversion_constants": np.where(used, array.conversion_constants, np.nan),
-        "modes": modes,
-        "root": 1e-3 * rng.normal(size=(parameters, 7)),
-        "effects": {"load": np.full(parameters, -0.01), "thickness": rng.normal(size=parameters)},
-        "readings": ArrayReadings(*place, np.ones(points), *u),
-        "noise": 1e-12 * (np.eye(n) + 0.5),
-        "baseline_uncertainties": np.full(n, 1e-5),
-        "layout": array.centres + 1e-5,
-        "layout_uncertainty": 2e-5,
-        "reading_high": np.full(n, 1.0),
-        "checks": (QualityCheck("dead_taxels", 1.0, 0.0, False, "One is dead."),),
-        "failing": {"dead_taxels": ("T05",)},
-    }
-    return replace(array, **(stated | changes))
 
 
 @pytest.mark.parametrize("own", [False, True])
