@@ -28,6 +28,8 @@ from memscal.model.scan import Scan
 IDENTIFIED = 0.005
 #: Estimates by common and by own shapes agree within so many uncertainties of their difference.
 _AGREEING = 2.0
+#: The variance of a difference is at least this share of the larger one: shapes are averaged.
+_LEAST_APART = 0.5
 #: A scan reaches beyond the last sensor by so many thicknesses of the film, or a little less.
 _BEYOND = 2.0
 _SHORT = 0.1
@@ -133,9 +135,11 @@ def _of_fit(fit: JointFit, compared: JointFit, array: ArrayData) -> Iterator[Fai
     near = fit.model.layout.crosstalk >= 0
     if near.any():
         yield _identified(fit, near)
-        yield _models_agree(fit, compared)
-    if len(near) > 1:
-        yield _common_kernel(fit if fit.model.layout.own.size else compared)
+    # With shapes of their own none is assumed to be common.
+    if len(near) > 1 and not fit.model.layout.own.size:
+        if near.any():
+            yield _models_agree(fit, compared)
+        yield _common_kernel(compared)
     yield _chi_square(fit, array)
     if len(near) > 1:
         yield _press_errors(fit)
@@ -181,7 +185,7 @@ def _models_agree(fit: JointFit, compared: JointFit) -> Failing:
     difference = both[0][0] - both[1][0]
     # The variance of the difference is that of the variances, at least a share of the larger one.
     larger = np.maximum(both[0][1], both[1][1])
-    apart = np.maximum(abs(both[0][1] - both[1][1]), 0.1 * larger)
+    apart = np.maximum(abs(both[0][1] - both[1][1]), _LEAST_APART * larger)
     z = difference / np.sqrt(apart)
     m = len(fit.state.gain)
     return Failing(
@@ -209,9 +213,12 @@ def _common_kernel(own: JointFit) -> Failing:
     explained = inverse @ scaled[np.ix_(rest, np.append(widths, 0))]
     left = scaled[np.ix_(widths, np.append(widths, 0))] - scaled[np.ix_(widths, rest)] @ explained
     information = left[:, :-1]
+    # The readings were linearised before the last step.
+    before = own.state.own[:, 0] - own.posterior.change[layout.own[:, 0]]
+    data = left[:, -1] * scale[0] + information @ (before * scale[widths])
     values, vectors = np.linalg.eigh(information)
     told = values > 1e-8 * values[-1]
-    found = vectors.T @ (left[:, -1] + information @ (own.state.own[:, 0] * scale[widths]))
+    found = vectors.T @ data
     square = np.sum(found[told] ** 2 / values[told])
     degrees = min(int(told.sum()), len(widths) - 1)
     z = abs(own.state.own[:, 0]) / np.linalg.norm(own.posterior.root[layout.own[:, 0]], axis=1)
@@ -234,7 +241,8 @@ def _chi_square(fit: JointFit, array: ArrayData) -> Failing:
     count = presses.keep.sum(axis=1)
     residual = fit.residual
     if presses.stated is not None:
-        ratio = np.sum((residual / presses.stated) ** 2, axis=1, where=presses.keep) / count
+        variance = presses.stated**2 + np.sum(fit.model.press_errors(fit.state) ** 2, axis=0)
+        ratio = np.sum(residual**2 / variance, axis=1, where=presses.keep) / count
     else:
         step = np.diff(residual, axis=1)
         both = presses.keep[:, 1:] & presses.keep[:, :-1]
@@ -261,24 +269,19 @@ def _chi_square(fit: JointFit, array: ArrayData) -> Failing:
 
 def _press_errors(fit: JointFit) -> Failing:
     """Test whether readings of one press share errors of place and load that are not counted."""
-    presses = fit.model.presses
-    signals, slopes = fit.model.signals(fit.state)
-    towards = fit.model.distances(fit.state)[1]
-    along = slopes * towards[presses.axes[0]]
-    patterns = ((along, presses.place_errors), (signals, presses.load_errors))
-    white = np.linalg.cholesky(np.linalg.inv(fit.noise.covariance)).T
-    residual = white @ fit.residual
-    ratios = []
-    for pattern, stated in patterns:
-        changes = white @ (fit.state.crosstalk @ pattern * presses.keep)
-        size = np.sum(changes**2, axis=0)
-        explained = np.sum(changes * residual, axis=0) ** 2 / np.where(size > 0, size, 1.0)
-        ratios.append(np.mean(explained / (1 + stated**2 * size)))
-    count = residual.shape[1]
+    errors = fit.model.press_errors(fit.state)
+    covariance = fit.noise.covariance + np.einsum("cit,cjt->tij", errors, errors)
+    patterns = np.moveaxis(fit.model.by_press(fit.state), (0, 2), (2, 0))
+    residual = fit.residual.T[:, :, None]
+    weighted = np.linalg.solve(covariance, patterns)
+    size = np.sum(patterns * weighted, axis=1)
+    explained = np.sum(residual * weighted, axis=1) ** 2 / np.where(size > 0, size, 1.0)
+    ratios = explained.mean(axis=0)
+    count = len(explained)
     return Failing(
         check(
             "press_errors",
-            max(ratios),
+            ratios.max(),
             chdtri(count, FALSE_ALARM / 2) / count,
             "What an error of place, or of load, common to all sensors explains of the residuals "
             "of a press, over what noise has it explain. A failure means that place or load "
@@ -291,8 +294,9 @@ def _common_mode(fit: JointFit) -> Failing:
     """Test whether pairs of sensors have more, or less, noise in common than a board has."""
     keep = fit.model.presses.keep.astype(float)
     count = np.maximum(keep @ keep.T, 1)
-    scale = np.sqrt(np.diag(fit.noise.covariance))
-    apart = fit.residual @ fit.residual.T / count - fit.noise.covariance
+    expected = fit.noise.covariance + fit.noise.of_presses
+    scale = np.sqrt(np.diag(expected))
+    apart = fit.residual @ fit.residual.T / count - expected
     z = abs(apart / np.outer(scale, scale)) * np.sqrt(count)
     np.fill_diagonal(z, 0.0)
     limit = float(-ndtri(FALSE_ALARM / (len(z) * (len(z) - 1))))

@@ -343,14 +343,15 @@ def _begun(
     centres = (high @ presses.places.T) / high.sum(axis=1)[:, None]
     largest = int(np.argmax(found.peak[used]))
     everywhere = _all_places(scan, used, centres)
-    pairs = _pairs(scan, used, everywhere, crosstalk)[used]
+    layout = everywhere if scan.layout is None else scan.layout
+    pairs = _pairs(scan, used, layout, crosstalk)[used]
     # Neighbours may read what a dead sensor does not tell.
     leaking = pairs[:, ~used] & np.isfinite(everywhere[~used, 0])
     reach = np.hypot(*np.ptp(presses.places, axis=1))
     waves = Waves.of(references[0], reach)
-    layout = Layout.of(presses, pairs[:, used], leaking, largest, 0)
+    parameters = Layout.of(presses, pairs[:, used], leaking, largest, 0)
     none = np.zeros((forward.k.size, 0))
-    model = JointModel(presses, waves, layout, np.nan_to_num(everywhere[~used]), none)
+    model = JointModel(presses, waves, parameters, np.nan_to_num(everywhere[~used]), none)
     drift = np.zeros((used.sum(), presses.drift.shape[1]))
     drift[:, 0] = found.baseline[used]
     peak = found.peak[used]
@@ -364,7 +365,8 @@ def _begun(
         np.zeros((used.sum(), 0)),
         np.zeros(leaking.shape),
     )
-    noise = Noise((_AT_FIRST * peak) ** 2, np.zeros((peak.size, peak.size)))
+    nothing = np.zeros((peak.size, peak.size))
+    noise = Noise((_AT_FIRST * peak) ** 2, nothing, nothing)
     return _Begun(model, state, noise, gaussian, forward)
 
 

@@ -32,7 +32,7 @@ from memscal.estimation.forward import ForwardModel
 from memscal.estimation.gaussian import GaussianFit
 from memscal.estimation.voltage_map import VoltageMap, square_root
 from memscal.extensions.arrays.joint_model import ArrayState, Information, JointModel, Layout, Noise
-from memscal.extensions.arrays.presses import Presses, Waves
+from memscal.extensions.arrays.presses import Waves
 from memscal.model.arrays import FloatArray, array_record
 
 #: Standard deviations of crosstalk about its mean that are weighed, and that of the mean.
@@ -224,13 +224,16 @@ def _stepped(
     return moved, np.array([changed[0], max(abs(changed[1]), 0.1 * widths[1])])
 
 
-def noise_of(presses: Presses, residual: FloatArray, parameters: float) -> Noise:
-    """Estimate each sensor's own noise, and what is common to a board, from residuals (m, t)."""
+def noise_of(model: JointModel, state: ArrayState) -> Noise:
+    """Estimate each sensor's own noise, and what is common to a board, from what is left."""
+    presses = model.presses
+    residual = np.where(presses.keep, presses.u - model.predicted(state), 0.0)
+    errors = model.press_errors(state)
     count = presses.keep.sum(axis=1)
-    both = presses.keep.astype(float) @ presses.keep.T
-    freedom = np.maximum(1 - parameters / count, 0.1)
-    square = residual @ residual.T / np.maximum(both, 1)
-    square /= np.sqrt(np.outer(freedom, freedom))
+    both = np.maximum(presses.keep.astype(float) @ presses.keep.T, 1)
+    of_presses = np.sum(errors @ errors.mT, axis=0) / both
+    freedom = np.maximum(1 - model.layout.count / len(count) / count, 0.1)
+    square = residual @ residual.T / both / np.sqrt(np.outer(freedom, freedom)) - of_presses
     common = np.zeros_like(square)
     for i in np.unique(presses.board):
         members = np.flatnonzero(presses.board == i)
@@ -242,9 +245,9 @@ def noise_of(presses: Presses, residual: FloatArray, parameters: float) -> Noise
     if presses.stated is not None:
         stated = np.sum(presses.stated**2, axis=1, where=presses.keep) / count
         total = np.maximum(total, stated)
-    floor = (_ROUNDING * np.ptp(presses.u, axis=1)) ** 2
-    least = np.maximum(_LEAST_OWN * total, floor)
-    return Noise(np.maximum(total - np.diag(common), least), common)
+    largest = np.ptp(presses.u, axis=1)
+    least = np.maximum(_LEAST_OWN * total, (_ROUNDING * largest) ** 2)
+    return Noise(np.maximum(total - np.diag(common), least), common, of_presses)
 
 
 def fit_array(
@@ -253,9 +256,9 @@ def fit_array(
     """Fit an array from a start: a Gaussian first, then the shape of G that is common to all."""
     for _ in range(2):
         state, gaussian = fit_gaussian(model, state, noise, gaussian)
-        noise = _noise(model, state)
+        noise = noise_of(model, state)
     first = fit_shape(model, state, noise, gaussian, forward)
-    return fit_shape(model, first.state, _noise(model, first.state), gaussian, forward)
+    return fit_shape(model, first.state, noise_of(model, first.state), gaussian, forward)
 
 
 def fit_shape(
@@ -297,12 +300,6 @@ def _spreads(layout: Layout) -> Sequence[float]:
 def _gaussian(gaussian: GaussianFit) -> FloatArray:
     transfer = gaussian_transfer(gaussian.geometry.k, gaussian.sigma)
     return gaussian.conversion_constant * transfer
-
-
-def _noise(model: JointModel, state: ArrayState) -> Noise:
-    presses = model.presses
-    residual = np.where(presses.keep, presses.u - model.predicted(state), 0.0)
-    return noise_of(presses, residual, model.layout.count / len(presses.u))
 
 
 @array_record

@@ -42,6 +42,7 @@ class Noise:
 
     own: FloatArray  # (m,): variance, in V^2
     common: FloatArray  # (m, m): covariance of sensors of one board, in V^2
+    of_presses: FloatArray  # (m, m): mean one by stated errors of place and load, in V^2
 
     @property
     def covariance(self) -> FloatArray:
@@ -191,7 +192,7 @@ class JointModel:
         profiles = self.waves.profiles(np.hstack([kernels, self.own]))
         factors = state.gain[:, None] * presses.load
         by_kernel = [f[:, None] * profiles(r) for f, r in zip(factors, radius, strict=True)]
-        common = self._common(state, noise, signals, moved[0])
+        common = self._common(noise, self.press_errors(state))
         gram = np.zeros((1 + p + q, 1 + p + q))
         shared = np.zeros((len(common), presses.load.size, 1 + p + q))
         kernel_places = np.arange(1 + p, 1 + p + q)
@@ -232,22 +233,27 @@ class JointModel:
             gram -= self._in_common(common, noise, shared)
         return Information(gram, p, int(presses.keep.sum()))
 
-    def _common(
-        self, state: ArrayState, noise: Noise, signals: FloatArray, moved: FloatArray
-    ) -> FloatArray:
+    def by_press(self, state: ArrayState) -> FloatArray:
+        """Derivatives of kept readings by the place along the scan and by ln load, (2, m, t)."""
+        signals, slopes = self.signals(state)
+        along = -slopes * self.distances(state)[1][self.presses.axes[0]]
+        return np.stack([state.crosstalk @ along, state.crosstalk @ signals]) * self.presses.keep
+
+    def press_errors(self, state: ArrayState) -> FloatArray:
+        """What one standard deviation of the place and of the load of each press do, (2, m, t)."""
+        stated = np.stack([self.presses.place_errors, self.presses.load_errors])
+        return self.by_press(state) * stated[:, None]
+
+    def _common(self, noise: Noise, errors: FloatArray) -> FloatArray:
         """What one deviation of each thing in common to a press does, (c, m, t), in V."""
-        presses = self.presses
+        board = self.presses.board
         deviation = np.sqrt(np.diag(noise.common))
         boards = [
-            np.broadcast_to((deviation * (presses.board == i))[:, None], signals.shape)
-            for i in np.unique(presses.board)
-        ]
-        errors = [
-            presses.place_errors * (state.crosstalk @ -moved),
-            presses.load_errors * (state.crosstalk @ signals),
+            np.broadcast_to((deviation * (board == i))[:, None], errors.shape[1:])
+            for i in np.unique(board)
         ]
         stated = [change for change in [*boards, *errors] if change.any()]
-        return np.reshape(stated, (len(stated), *signals.shape))
+        return np.reshape(stated, (len(stated), *errors.shape[1:]))
 
     def _in_common(self, common: FloatArray, noise: Noise, shared: FloatArray) -> FloatArray:
         """What readings of a press that share their errors tell less, by Woodbury's identity."""

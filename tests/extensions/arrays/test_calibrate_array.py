@@ -1,0 +1,121 @@
+"""Calibration of an array against an independent layer: what is found, named, left out, refused."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from helpers.true_arrays import Errors, simulated_scan
+
+import memscal
+from memscal.errors import FitError, InputError, MemscalError
+
+
+def deviations(array, true):
+    """Errors of A and of the estimated crosstalk over their uncertainties."""
+    n = len(array.sensors)
+    u = array.uncertainties()
+    near = array.estimated
+    of_a = np.log(array.conversion_constants / true.conversion_constants) / u[:n]
+    of_c = (array.crosstalk - true.crosstalk)[near] / u[3 * n : 3 * n + near.sum()]
+    return of_a, of_c
+
+
+@pytest.mark.parametrize("shape", [(1, 6), (3, 3)], ids=["row", "grid"])
+@pytest.mark.parametrize("kernel", ["gaussian", "disc", "tails"])
+def test_an_array_is_found(shape, kernel):
+    scan, true = simulated_scan(*shape, kernel=kernel, seed=3)
+    calibration = memscal.calibrate_array(scan)
+    array = calibration.array
+    of_a, of_c = deviations(array, true)
+    # All by one scan, of which load and thickness are common to all.
+    assert np.sqrt(np.mean(of_a**2)) < 3.5
+    assert np.sqrt(np.mean(of_c**2)) < 3.5
+    assert np.all(abs(array.centres - true.centres)[:, 0] < 10e-6)
+    assert np.isnan(array.centres[:, 1]).all() == (shape[0] == 1)
+    assert array.sensors == true.sensors
+    assert np.allclose(np.diag(array.crosstalk), 1)
+    near = array.crosstalk[array.estimated]
+    assert abs(near.mean() - 0.01) < 0.005
+
+
+def test_sensors_share_the_errors_of_load_and_film():
+    array = memscal.calibrate_array(simulated_scan(1, 6, seed=1)[0]).array
+    a = array.conversion_constants
+    relative = array.covariance / np.outer(a, a)
+    ratio = relative[0, 0] + relative[1, 1] - 2 * relative[0, 1]
+    assert ratio < 0.2 * relative[0, 0]
+    assert np.allclose(array.effects["load"][:6], -0.01)
+
+
+def test_what_is_wrong_with_a_sensor_is_named_and_moves_no_other():
+    plain = memscal.calibrate_array(simulated_scan(1, 8, seed=5)[0]).array
+    errors = Errors(dead=(2,), ceiling={5: 0.6}, missing=0.02)
+    scan = simulated_scan(1, 8, seed=5, errors=errors)[0]
+    calibration = memscal.calibrate_array(scan)
+    array = calibration.array
+    assert array.used.tolist() == [i != 2 for i in range(8)]
+    assert array.failing["dead_taxels"] == ("T02",)
+    assert array.failing["saturation"] == ("T05",)
+    assert not calibration.passed
+    assert any("T02" in m.text for m in array.process.messages if m.severity == "warning")
+    used = array.used
+    moved = np.log(array.conversion_constants / plain.conversion_constants)[used]
+    assert np.all(abs(moved) < plain.uncertainties()[:8][used])
+
+
+def test_a_silent_sensor_that_is_stated_is_no_fault():
+    scan = simulated_scan(1, 4, seed=2)[0]
+    array = memscal.calibrate_array(replace(scan, used=[True, True, False, True])).array
+    assert array.used.tolist() == [True, True, False, True]
+    assert array.failing["dead_taxels"] == ()
+    assert np.isnan(array.conversion_constants[2])
+
+
+def test_crosstalk_and_own_shapes_are_one_thing_to_a_dense_row():
+    scan, true = simulated_scan(1, 8, pitch=1e-3, seed=1)
+    calibration = memscal.calibrate_array(scan, kernel="own")
+    check = next(c for c in calibration.checks if c.name == "crosstalk_identified")
+    assert not check.passed
+    of_a, _ = deviations(calibration.array, true)
+    assert np.sqrt(np.mean(of_a**2)) < 3
+
+
+@pytest.mark.parametrize(
+    ("crosstalk", "count"),
+    [("none", 0), ("nearest", 6), ("full", 12), ([("T00", "T01"), ("T03", "T02")], 2)],
+)
+def test_pairs_are_chosen(crosstalk, count):
+    scan = simulated_scan(1, 4, seed=2, crosstalk=0.0)[0]
+    array = memscal.calibrate_array(scan, crosstalk=crosstalk).array
+    assert array.estimated.sum() == count
+    assert np.count_nonzero(array.crosstalk) == 4 + count
+
+
+def test_wrong_layouts_and_unstated_errors_of_presses_fail_their_checks():
+    scan = simulated_scan(3, 3, seed=4)[0]
+    swapped = replace(scan, layout=scan.layout[[1, 0, *range(2, 9)]])
+    failing = memscal.calibrate_array(swapped).array.failing
+    assert set(failing["layout"]) >= {"T00", "T01"}
+    jitter = simulated_scan(1, 6, seed=4, errors=Errors(noise=0.002, place=30e-6, load=0.02))[0]
+    assert memscal.calibrate_array(jitter).passed
+    unstated = replace(jitter, x_errors=None, normal_load=None, normal_load_errors=None)
+    checks = memscal.calibrate_array(unstated).checks
+    assert "press_errors" in [check.name for check in checks if not check.passed]
+
+
+def refused_scans():
+    scan = simulated_scan(1, 3, seed=1)[0]
+    yield "single", scan.of_sensor(0), {}, InputError, "single sensor"
+    yield "kernel", scan, {"kernel": "comon"}, MemscalError, "common"
+    yield "crosstalk", scan, {"crosstalk": "nearst"}, MemscalError, "nearest"
+    yield "pair", scan, {"crosstalk": [("T00", "T1")]}, MemscalError, "T01"
+    yield "silent", replace(scan, u_zz=0 * scan.u_zz), {}, FitError, "3 sensors"
+
+
+@pytest.mark.parametrize(
+    ("scan", "options", "error", "word"),
+    [pytest.param(*case[1:], id=case[0]) for case in refused_scans()],
+)
+def test_refused(scan, options, error, word):
+    with pytest.raises(error, match=word):
+        memscal.calibrate_array(scan, **options)
