@@ -50,6 +50,8 @@ class Contacts(FrozenArrays, Shown, Tabulated):
         Number of each frame.
     time : ndarray, shape (frames,), or None
         Time of each frame, in s.
+    centres : ndarray, shape (sensors, 2), or None
+        Places of the sensors that were used, in m.
     unit : str
         Unit of the forces: ``N``, or ``1`` of presses.
 
@@ -73,6 +75,7 @@ class Contacts(FrozenArrays, Shown, Tabulated):
     indenter: RoundIndenter | None
     frame: IndexArray | FloatArray
     time: FloatArray | None = None
+    centres: FloatArray | None = None
     unit: str = "N"
 
     def __repr__(self) -> str:

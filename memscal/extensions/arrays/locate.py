@@ -127,6 +127,7 @@ class Seeking:
     high: FloatArray
     thickness: float
     load: float  # usual, in the unit of the forces
+    near: float  # prior standard deviation of the distance from the sensors' box, in m
 
     @classmethod
     def on(cls, array: ArrayData, indenter: Touch, shear: float) -> Seeking:
@@ -148,6 +149,7 @@ class Seeking:
             high=np.where(margin > 0, high + margin, middle),
             thickness=thickness,
             load=array.load,
+            near=_OUTSIDE * thickness,
         )
 
     @property
@@ -188,7 +190,6 @@ def locate(
     zero, scatter = _zero(array, rest)
     saturated = _at_an_end(array, readings, tared=rest is None)
     values = np.where(saturated, np.nan, readings - zero)[:, sensors]
-    noise = (array.noise + scatter)[np.ix_(sensors, sensors)]
     count = len(values)
     state = np.full((count, 5), np.nan)
     covariance = np.full((count, 3, 3), np.nan)
@@ -197,16 +198,15 @@ def locate(
     flags = np.where(np.isfinite(readings).any(axis=1), flag.TOO_FEW, flag.NO_READING)
     flags = flags.astype(object)
     grid = seeking.grid()
-    tuned = seeking.fields.normal(grid)[0]
+    fields, *_ = seeking.fields.normal(grid)
     for kept, frames in _patterns(seen):
         if kept.sum() <= len(seeking.axes):
             continue
-        whitener = np.linalg.inv(np.linalg.cholesky(noise[np.ix_(kept, kept)]))
-        sight = Sight(seeking, kept, whitener, grid, tuned[:, kept] @ whitener.T)
+        sight = Sight.of(seeking, array.noise + scatter, kept)
         for part in slices(frames.size, _BATCH):
             some = frames[part]
-            whitened = values[np.ix_(some, kept)] @ whitener.T
-            starts, detected = sight.starts(whitened)
+            whitened = values[np.ix_(some, kept)] @ sight.whitener.T
+            starts, detected = sight.starts(whitened, grid, fields)
             flags[some] = np.where(detected, "", flag.NO_CONTACT)
             if detected.any():
                 found = some[detected]
@@ -237,26 +237,54 @@ def locate(
         assumed_shear=float(shear),
         indenter=None if isinstance(indenter, str) else indenter,
         frame=np.arange(count),
+        centres=seeking.fields.centres,
         unit=seeking.fields.unit,
     )
 
 
+Starts = tuple[FloatArray, BoolArray]
+
+
 @array_record
 class Sight:
-    """Frames in which the same s sensors read: their noise made white, and the fields on a grid."""
+    """Frames in which the same s sensors read: their noise made white."""
 
     seeking: Seeking
     kept: BoolArray  # (n,)
     whitener: FloatArray  # (s, s)
-    grid: FloatArray  # (g, 2)
-    tuned: FloatArray  # (g, s): whitened fields per newton
 
-    def starts(self, u: FloatArray) -> tuple[FloatArray, BoolArray]:
-        """Return the best places of whitened frames (m, s), (m, 3, 2), and whether one is seen."""
-        size = np.linalg.norm(self.tuned, axis=1)
+    @classmethod
+    def of(cls, seeking: Seeking, noise: FloatArray, kept: BoolArray | None = None) -> Sight:
+        """Return the sight of sensors (n,), by default all that are used, in noise of all."""
+        sensors = seeking.fields.sensors
+        kept = np.ones(sensors.size, bool) if kept is None else kept
+        some = sensors[kept]
+        root = np.linalg.cholesky(noise[np.ix_(some, some)])
+        return cls(seeking, kept, floats(np.linalg.inv(root)))
+
+    def covariance(self, state: FloatArray, errors: FloatArray | None = None) -> FloatArray:
+        """Return covariances of x, y and force by noise, priors, and errors, (m, 3, 3)."""
+        _, slopes = self._whitened(state)
+        curved, size = self._scaled(slopes, state)
+        whole = np.linalg.inv(curved) / (size[:, :, None] * size[:, None])
+        if errors is not None:
+            moved = whole @ slopes.swapaxes(1, 2) @ errors
+            whole = whole + moved @ moved.swapaxes(1, 2)
+        covariance = np.full((len(state), 3, 3), np.nan)
+        told = [i for i in self.seeking.free if i < 3]
+        covariance[np.ix_(range(len(state)), told, told)] = whole[:, : len(told), : len(told)]
+        return covariance
+
+    def starts(self, u: FloatArray, grid: FloatArray, fields: FloatArray) -> Starts:
+        """Return the best places of frames (m, s), (m, 3, 2), and whether a contact is seen.
+
+        Places of the grid are (g, 2), and their fields (g, n) per newton.
+        """
+        tuned = fields[:, self.kept] @ self.whitener.T
+        size = np.linalg.norm(tuned, axis=1)
         seen = size > _SEEN * size.max()
-        places = self.grid[seen]
-        score = u @ (self.tuned[seen] / size[seen, None]).T
+        places = grid[seen]
+        score = u @ (tuned[seen] / size[seen, None]).T
         detected = score.max(axis=1) > DETECTED
         starts = np.zeros((len(u), _STARTS, 2))
         for i in range(_STARTS):
@@ -288,31 +316,20 @@ class Sight:
         seeking = self.seeking
         value, slopes = self._whitened(state)
         errors = self.whitener @ seeking.fields.errors(*_parts(state))[:, self.kept]
-        inverse = self.inverse(slopes, state)
-        moved = inverse @ slopes.swapaxes(1, 2) @ errors
-        whole = inverse + moved @ moved.swapaxes(1, 2)
-        covariance = np.full((len(u), 3, 3), np.nan)
-        told = [i for i in seeking.free if i < 3]
-        covariance[np.ix_(range(len(u)), told, told)] = whole[:, : len(told), : len(told)]
-
         # Without the shear that was found, which is noise with the prior's deviation.
-        sheared = slopes[..., len(told) :]
+        told = len(seeking.axes) + 1
+        sheared = slopes[..., told:]
         ratios = state[:, [i for i in seeking.free if i >= 3]]
         residual = u - value + np.einsum("msq,mq->ms", sheared, ratios)
         spread = np.concatenate([errors, seeking.shear * sheared], axis=-1)
         spread = np.eye(self.kept.sum()) + spread @ spread.swapaxes(1, 2)
-        columns = np.concatenate([residual[..., None], slopes[..., : len(told)]], axis=-1)
+        columns = np.concatenate([residual[..., None], slopes[..., :told]], axis=-1)
         products = columns.swapaxes(1, 2) @ np.linalg.solve(spread, columns)
         fitted = np.linalg.solve(products[:, 1:, 1:], products[:, 1:, :1])
         square = products[:, 0, 0] - (products[:, :1, 1:] @ fitted)[:, 0, 0]
-        freedom = residual.shape[1] - len(told)
+        freedom = residual.shape[1] - told
         p_value = chdtrc(freedom, square) if freedom else np.full(len(u), np.nan)
-        return covariance, p_value
-
-    def inverse(self, slopes: FloatArray, state: FloatArray) -> FloatArray:
-        """Return the covariance of the free parameters by noise and prior, (m, f, f)."""
-        curved, size = self._scaled(slopes, state)
-        return floats(np.linalg.inv(curved) / (size[:, :, None] * size[:, None]))
+        return self.covariance(state, errors), p_value
 
     def _settle(self, u: FloatArray, state: FloatArray, least: FloatArray) -> FloatArray:
         """Move states (m, 5) to their least chi-square by damped Gauss-Newton steps; return it."""
@@ -360,7 +377,7 @@ class Sight:
         away[:, :2] -= np.clip(away[:, :2], centres.min(axis=0), centres.max(axis=0))
         away[:, 2] = 0.0
         weight = np.zeros_like(away)
-        weight[:, :2] = np.where(away[:, :2], (_OUTSIDE * seeking.thickness) ** -2, 0.0)
+        weight[:, :2] = np.where(away[:, :2], seeking.near**-2, 0.0)
         weight[:, 3:] = (seeking.shear or np.inf) ** -2
         return np.stack([away, weight])[..., list(seeking.free)]
 

@@ -3,14 +3,19 @@
 from dataclasses import field
 from os import PathLike
 
+from numpy.typing import ArrayLike
+
 from memscal.apparatus import ApparatusFunction
 from memscal.errors import FormatError
 from memscal.extensions.arrays import files
 from memscal.extensions.arrays.array_data import ArrayData
+from memscal.extensions.arrays.bound import bound, predict
+from memscal.extensions.arrays.contacts import Contacts
+from memscal.extensions.arrays.locate import Touch, locate
 from memscal.extensions.arrays.single_sensor import single_sensor
 from memscal.formats.hdf5.reader import open_hdf5
 from memscal.formats.hdf5.writer import ARTIFACT_SCHEMA, SCHEMA_ATTRIBUTE
-from memscal.model.arrays import keyword_array_record
+from memscal.model.arrays import FloatArray, keyword_array_record
 from memscal.model.provenance import SourceFile
 from memscal.model.result import Correlated, Gridded, Shown
 
@@ -69,6 +74,121 @@ class SensorArray(ArrayData, Shown, Correlated, Gridded):
         True
         """
         return single_sensor(self, name)
+
+    def locate(
+        self,
+        u: ArrayLike,
+        indenter: Touch = "point",
+        shear: float = 0.3,
+        rest: ArrayLike | None = None,
+    ) -> Contacts:
+        r"""Find place and force of a contact in each frame.
+
+        The readings are explained by :math:`u_i = P \sum_j C_{ij} A_j [f_j + q \cdot s_j](r)`
+        with the stress of the indenter and of its shear at the base of the film, blurred by G
+        (:mod:`~memscal.extensions.arrays.receptive_fields`), in noise as in the scan.  Shear
+        moves the readings as another place does, by a third of h Q/P: unless it is known, state
+        how large it may be.
+
+        Parameters
+        ----------
+        u : array_like, shape (frames, n)
+            Readings in their SI unit, zero without contact (or see ``rest``), columns in the
+            order of ``sensors``; NaN is missing.  Readings at an end of a sensor's range are
+            left out.
+        indenter : "point", Rod or Sphere
+            What presses; the contact radius of a sphere follows from the force and the film.
+        shear : float
+            Standard deviation of each component of shear over normal force; 0: there is none.
+        rest : array_like, shape (m, n) or (n,), optional
+            Readings without contact on the same scale: their mean is subtracted, and the
+            uncertainty of the mean is counted.
+
+        Returns
+        -------
+        Contacts
+            With NaN where nothing is found; its flags say why.  Of a row of sensors ``y`` is that
+            of the row, and its variances are NaN.
+
+        Raises
+        ------
+        InputError
+            If the number of columns is not that of the sensors, or indenter or shear make no
+            sense.
+
+        Examples
+        --------
+        >>> import memscal
+        >>> scan = memscal.simulate(array=(1, 3), pitch=2e-3, crosstalk=0.01, seed=1)
+        >>> array = memscal.calibrate_array(scan).array
+        >>> u = array.predict([[0.5e-3, 0.0]], force=0.8)
+        >>> contacts = array.locate(u, shear=0.0)
+        >>> round(float(contacts.x[0]) * 1e3, 3), round(float(contacts.force[0]), 3)
+        (0.5, 0.8)
+        """
+        return locate(self, u, indenter, shear, rest)
+
+    def predict(
+        self,
+        places: ArrayLike,
+        force: ArrayLike = 1.0,
+        *,
+        indenter: Touch = "point",
+        shear: ArrayLike = 0.0,
+    ) -> FloatArray:
+        """Return what the sensors read of contacts, shape (m, n), in the unit of the readings.
+
+        Parameters
+        ----------
+        places : array_like, shape (m, 2)
+            x and y of each contact, in m.
+        force : array_like, shape () or (m,)
+            Normal forces, in N.
+        indenter : "point", Rod or Sphere
+            What presses.
+        shear : array_like, shape (), (2,) or (m, 2)
+            Shear force on the film over normal force, along x and y.
+
+        Raises
+        ------
+        InputError
+            If the places have another shape, or the indenter is another one.
+        """
+        return predict(self, places, force, indenter, shear)
+
+    def bound(
+        self,
+        places: ArrayLike,
+        force: ArrayLike = 1.0,
+        *,
+        indenter: Touch = "point",
+        shear: float = 0.3,
+    ) -> FloatArray:
+        """Return the Cramer-Rao bound of x, y and force at places, covariances (m, 3, 3).
+
+        No unbiased estimate of a single frame has less variance in the noise of the scan, the
+        array being known exactly, and the shear within its standard deviation.
+
+        Parameters
+        ----------
+        places, force, indenter, shear
+            As of :meth:`predict` and :meth:`locate`.
+
+        Raises
+        ------
+        InputError
+            If the places have another shape, or indenter or shear make no sense.
+
+        Examples
+        --------
+        >>> import memscal
+        >>> scan = memscal.simulate(array=(1, 3), pitch=2e-3, crosstalk=0.01, seed=1)
+        >>> array = memscal.calibrate_array(scan).array
+        >>> close, outside = array.bound([[0.5e-3, 0.0], [4e-3, 0.0]], shear=0.0)[:, 0, 0]
+        >>> bool(close < outside)
+        True
+        """
+        return bound(self, places, force, indenter, shear)
 
     def save(self, path: str | PathLike[str], *, overwrite: bool = False) -> None:
         """Write the array to an artifact file.

@@ -1,0 +1,50 @@
+"""The least uncertainty with which an array locates a contact: the Cramer-Rao bound."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from memscal.errors import InputError
+from memscal.extensions.arrays.array_data import ArrayData
+from memscal.extensions.arrays.locate import Seeking, Sight, Touch
+from memscal.model.arrays import FloatArray, floats
+
+
+def bound(
+    array: ArrayData,
+    places: ArrayLike,
+    force: ArrayLike = 1.0,
+    indenter: Touch = "point",
+    shear: float = 0.3,
+) -> FloatArray:
+    """Covariance of x, y and force by the noise, (m, 3, 3): :meth:`SensorArray.bound`."""
+    seeking = replace(Seeking.on(array, indenter, shear), near=np.inf)
+    state = states(places, force, 0.0)
+    return Sight.of(seeking, array.noise).covariance(state)
+
+
+def predict(
+    array: ArrayData, places: ArrayLike, force: ArrayLike, indenter: Touch, shear: ArrayLike
+) -> FloatArray:
+    """Readings of contacts, (m, n): :meth:`SensorArray.predict`."""
+    fields = Seeking.on(array, indenter, 0.0).fields
+    state = states(places, force, shear)
+    readings = np.full((len(state), len(array.sensors)), np.nan)
+    readings[:, fields.sensors], _ = fields.forward(state[:, :2], state[:, 2], state[:, 3:])
+    return readings
+
+
+def states(places: ArrayLike, force: ArrayLike, shear: ArrayLike) -> FloatArray:
+    """Return contacts as rows of x, y, force, and shear over force along x and y, (m, 5)."""
+    at = np.atleast_2d(floats(places))
+    if at.ndim != 2 or at.shape[1] != 2:
+        raise InputError(
+            f"The places have shape {np.shape(places)}, but x and y of each are needed, (m, 2).",
+            cure="Give rows of x and y in m.",
+        )
+    count = len(at)
+    forces = np.broadcast_to(floats(force), count)
+    return np.column_stack([at, forces, np.broadcast_to(floats(shear), (count, 2))])

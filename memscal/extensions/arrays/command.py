@@ -1,0 +1,98 @@
+"""``memscal locate``: where contacts press on an array of sensors, and how strongly."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import click
+
+from memscal.cli import output as out
+from memscal.cli.options import (
+    FILE,
+    NonNegative,
+    Quantity,
+    accept_altered_option,
+    figure_option,
+    option,
+    out_option,
+    output_options,
+)
+from memscal.formats.files import together
+
+EXAMPLES = """\b
+Examples:
+  memscal locate array.h5 frames.csv -o contacts.csv
+  memscal locate array.h5 frames.csv --indenter rod:0.25 --shear 0 -o contacts.csv
+  memscal locate array.h5 frames.csv --indenter sphere:5 --rest rest.csv --figure contacts.png
+"""
+
+
+def _indenter(ctx: click.Context, param: click.Parameter, text: str) -> Any:
+    """Read an indenter: ``point``, ``rod:MM`` or ``sphere:MM``."""
+    shape, _, radius = text.partition(":")
+    if text == "point":
+        return text
+    if shape not in ("rod", "sphere"):
+        raise click.BadParameter(f"{text!r} is not point, rod:MM or sphere:MM.", ctx, param)
+    from memscal.model.indenter import Rod, Sphere
+
+    kind = {"rod": Rod, "sphere": Sphere}[shape]
+    return kind(radius=Quantity("mm").convert(radius, param, ctx))
+
+
+@click.command("locate", epilog=EXAMPLES)
+@click.argument("array", type=FILE)
+@click.argument("frames", type=FILE)
+@option("--indenter", "point|rod:MM|sphere:MM", "point", callback=_indenter)(
+    "What presses: a point, or a rod or a sphere of a radius in mm (not the diameter)."
+)
+@option("--shear", NonNegative("ratio"), 0.3)(
+    "Standard deviation of the shear over the normal force along each axis; 0: there is none."
+)
+@option("--rest", FILE, metavar="rest.csv")(
+    "Frames without contact, whose mean is subtracted; without them frames are tared."
+)
+@option("--u-unit", "UNIT")("Unit of the readings where the heads of the table state none.")
+@out_option("Table to write (.csv): place and force of each frame, with uncertainties and flags.")
+@accept_altered_option
+@figure_option("Draw places and forces.")
+@output_options
+def command(
+    array: Path,
+    frames: Path,
+    indenter: Any,
+    shear: float,
+    rest: Path | None,
+    u_unit: str | None,
+    output: Path | None,
+    accept_altered: bool,
+    figures: tuple[Path, ...],
+    as_json: bool,
+    force: bool,
+) -> None:
+    """Find where contacts press on a calibrated ARRAY in each of the FRAMES, and how strongly.
+
+    FRAMES is a table with a row for each frame and a column for each sensor, named after it, with
+    its unit: "T00 [mV]". A column "frame" or "t" is carried over. An empty cell is a missing
+    reading. One contact is sought in each frame.
+    """
+    out.prove_writable([output, *figures], force=force, inputs=[array, frames, rest])
+    from memscal.extensions.arrays.contacts_summary import csv_text
+    from memscal.extensions.arrays.frames import read_frames
+    from memscal.extensions.arrays.sensor_array import load_array
+
+    held = load_array(array, accept_altered=accept_altered)
+    read = read_frames(held, frames, u_unit)
+    zero = None if rest is None else read_frames(held, rest, u_unit).u
+    with out.working("Locating"):
+        contacts = held.locate(read.u, indenter=indenter, shear=shear, rest=zero)
+    if read.number is not None:
+        contacts = replace(contacts, frame=read.number)
+    contacts = replace(contacts, time=read.time)
+    files = out.drawn(contacts, figures)
+    if output is not None:
+        files[output] = csv_text(contacts).encode("utf-8")
+    with together():
+        out.write_files(files, force=force)
+        out.emit_result(contacts, {"contacts": output and str(output)}, as_json=as_json)
+    out.say_written(files)

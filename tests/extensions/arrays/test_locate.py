@@ -1,0 +1,302 @@
+"""Contacts on arrays, against readings of an independent layer; what is left out; the command."""
+
+import csv
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from helpers.arrays import FILM, ROD, known_array
+from helpers.outside import FILM as TRUE_FILM
+from helpers.schemas import faults
+from helpers.true_arrays import TrueArray
+
+import memscal
+
+LINEAR = replace(FILM, law="linear")
+SPHERE = memscal.Sphere(radius=5e-3)
+
+
+def array_and_truth(rows, columns, **known):
+    """An array of which everything is known, and what reads as it does."""
+    array = replace(known_array(rows, columns, **known), film=LINEAR)
+    true = TrueArray(
+        centres=array.places,
+        conversion_constants=array.conversion_constants,
+        crosstalk=array.crosstalk,
+        thickness=TRUE_FILM.thickness,
+    )
+    return array, true
+
+
+ROW, TRUE_ROW = array_and_truth(1, 6, noise=1e-3)
+GRID, TRUE_GRID = array_and_truth(4, 4, noise=1e-3)
+ARRAYS = pytest.mark.parametrize(
+    ("array", "true"), [(ROW, TRUE_ROW), (GRID, TRUE_GRID)], ids=["row", "grid"]
+)
+
+
+def drawn(array, rng, count=40):
+    """Places among the sensors, and forces."""
+    inside = np.abs(array.places).max(axis=0)
+    return rng.uniform(-1, 1, (count, 2)) * inside, np.exp(rng.uniform(-0.7, 0.7, count))
+
+
+def noise_of(array, rng, count):
+    return rng.multivariate_normal(np.zeros(len(array.sensors)), array.noise, count)
+
+
+@ARRAYS
+@pytest.mark.parametrize("indenter", [None, ROD, SPHERE])
+def test_without_noise_contacts_are_where_they_press(array, true, indenter, seed):
+    places, forces = drawn(array, np.random.default_rng(seed), 12)
+    u = true.readings(places, forces, indenter=indenter)
+    found = array.locate(u, indenter=indenter or "point", shear=0.0)
+    np.testing.assert_allclose(found.x, places[:, 0], atol=3e-6)
+    np.testing.assert_allclose(found.y, places[:, 1], atol=3e-6)
+    np.testing.assert_allclose(found.force, forces, rtol=3e-3)
+    assert set(found.flags) == {""}
+
+
+@ARRAYS
+def test_stated_uncertainties_hold_with_shear_in_the_truth(array, true, seed):
+    rng = np.random.default_rng(seed)
+    count = 200
+    places, forces = drawn(array, rng, count)
+    shears = 0.3 * forces[:, None] * rng.normal(size=(count, 2))
+    u = true.readings(places, forces, shears=shears) + noise_of(array, rng, count)
+    found = array.locate(u, indenter=ROD)
+    z = (np.stack([found.x, found.force]) - [places[:, 0], forces]) / found.uncertainties[
+        :, [0, 2]
+    ].T
+    # The rms of 200 normal numbers lies within 0.05; linearisation and the tails add to that.
+    assert np.all((np.sqrt(np.mean(z**2, axis=1)) > 0.8) & (np.sqrt(np.mean(z**2, axis=1)) < 1.25))
+    # p-values are even: their mean over 200 frames lies within 0.29 / sqrt(200) of a half.
+    assert abs(found.p_value.mean() - 0.5) < 4 * 0.0204
+
+
+@ARRAYS
+def test_places_are_as_good_as_the_bound(array, true, seed):
+    rng = np.random.default_rng(seed)
+    places, forces = drawn(array, rng, 200)
+    u = true.readings(places, forces, indenter=None) + noise_of(array, rng, 200)
+    found = array.locate(u, shear=0.0)
+    least = np.sqrt(np.diagonal(array.bound(places, forces, shear=0.0), axis1=1, axis2=2))
+    for error, of in [(found.x - places[:, 0], 0), (found.force - forces, 2)]:
+        assert np.sqrt(np.mean((error / least[:, of]) ** 2)) < 1.25
+
+
+def test_the_bound_is_that_of_the_derivatives_of_what_is_predicted():
+    """The inverse of J^T N^-1 J, J by differences of the predicted readings."""
+    place = np.array([0.7e-3, -0.4e-3])
+    steps = np.array([1e-5, 1e-5, 1e-3])
+    columns = []
+    for i in range(3):
+        ahead = steps * np.eye(3)[i]
+        more, less = (
+            GRID.predict(place + sign * ahead[:2], 0.8 + sign * ahead[2]) for sign in (1, -1)
+        )
+        columns.append((more - less)[0] / (2 * steps[i]))
+    jacobian = np.stack(columns, axis=1)
+    expected = np.linalg.inv(jacobian.T @ np.linalg.inv(GRID.noise) @ jacobian)
+    [found] = GRID.bound(place, 0.8, shear=0.0)
+    scale = np.sqrt(np.outer(np.diag(expected), np.diag(expected)))
+    np.testing.assert_allclose(found / scale, expected / scale, atol=5e-3)
+
+
+def test_of_a_row_y_is_that_of_the_row_and_not_known():
+    found = ROW.locate(TRUE_ROW.readings(np.array([[1e-3, 0.0]]), 1.0))
+    assert found.y[0] == ROW.line_y
+    assert np.isnan(found.covariance[0, 1]).all()
+    assert np.isnan(found.covariance[0, :, 1]).all()
+    assert np.isfinite(found.covariance[0][np.ix_([0, 2], [0, 2])]).all()
+
+
+def test_a_missing_frame_changes_no_other_one(seed):
+    rng = np.random.default_rng(seed)
+    places, forces = drawn(GRID, rng, 9)
+    u = TRUE_GRID.readings(places, forces) + noise_of(GRID, rng, 9)
+    alone = GRID.locate(u)
+    found = GRID.locate(np.insert(u, 4, np.nan, axis=0))
+    assert found.flags[4] == "no reading"
+    for name in ("x", "y", "force", "covariance"):
+        assert np.isnan(getattr(found, name)[4]).all()
+    for name in ("x", "y", "force", "shear", "covariance", "p_value"):
+        np.testing.assert_array_equal(
+            np.delete(getattr(found, name), 4, axis=0), getattr(alone, name)
+        )
+
+
+def test_missing_readings_and_unused_sensors_are_left_out(seed):
+    rng = np.random.default_rng(seed)
+    places, forces = drawn(GRID, rng, 20)
+    u = TRUE_GRID.readings(places, forces)
+    missing = u.copy()
+    missing[np.arange(20), rng.integers(0, 16, 20)] = np.nan
+    used = np.arange(16) != 5
+    dead = replace(
+        GRID, used=used, conversion_constants=np.where(used, GRID.conversion_constants, np.nan)
+    )
+    silent = replace(TRUE_GRID, conversion_constants=used * TRUE_GRID.conversion_constants)
+    wrong = silent.readings(places, forces)
+    wrong[:, 5] = 1.0
+    for found in (
+        GRID.locate(missing, indenter=ROD, shear=0.0),
+        dead.locate(wrong, indenter=ROD, shear=0.0),
+    ):
+        np.testing.assert_allclose(found.x, places[:, 0], atol=1e-5)
+        np.testing.assert_allclose(found.force, forces, rtol=5e-3)
+    assert GRID.locate(np.full((1, 16), np.nan)).flags == ("no reading",)
+    few = np.full((1, 16), np.nan)
+    few[0, :2] = u[0, :2]
+    assert GRID.locate(few).flags == ("too few readings",)
+
+
+def test_readings_at_a_ceiling_are_left_out_and_said():
+    u = TRUE_GRID.readings(np.array([[0.3e-3, 0.2e-3]]), 1.0)
+    limited = replace(GRID, reading_high=np.full(16, 0.5 * u.max()))
+    clipped = np.minimum(u, 0.5 * u.max())
+    found = limited.locate(clipped, indenter=ROD, shear=0.0)
+    assert found.flags == ("saturated",)
+    assert found.x[0] == pytest.approx(0.3e-3, abs=2e-5)
+    as_read = GRID.locate(clipped, indenter=ROD, shear=0.0)
+    assert abs(as_read.force[0] - 1) > 0.1
+    # Also where the frames are tared, and the ceiling is on the scale of the scan.
+    raised = replace(limited, baselines=np.full(16, 1e-3), reading_high=limited.reading_high + 1e-3)
+    assert raised.locate(clipped, indenter=ROD, shear=0.0).flags == ("saturated",)
+
+
+def test_readings_at_rest_are_subtracted_and_their_scatter_is_counted(seed):
+    rng = np.random.default_rng(seed)
+    offset = 1e-3 * rng.normal(size=16)
+    u = TRUE_GRID.readings(np.array([[1e-3, 0.5e-3]]), 1.0) + noise_of(GRID, rng, 1)
+    plain = GRID.locate(u, indenter=ROD, shear=0.0)
+    rest = offset + noise_of(GRID, rng, 1000)
+    many = GRID.locate(u + offset, indenter=ROD, shear=0.0, rest=rest)
+    assert many.x[0] == pytest.approx(plain.x[0], abs=1e-6)
+    assert many.uncertainties[0, 0] == pytest.approx(plain.uncertainties[0, 0], rel=0.01)
+    # One frame at rest has the variance of the frame itself.
+    one = GRID.locate(u + offset, indenter=ROD, shear=0.0, rest=rest[0])
+    assert one.uncertainties[0, 0] == pytest.approx(2**0.5 * plain.uncertainties[0, 0], rel=0.1)
+
+
+def test_noise_alone_is_no_contact(seed):
+    found = GRID.locate(noise_of(GRID, np.random.default_rng(seed), 1000))
+    # Five standard deviations at some 50 independent places: 1.4e-5 a frame.
+    assert found.flags.count("no contact") >= 998
+    quiet = np.array([flag == "no contact" for flag in found.flags])
+    assert np.isnan(found.x[quiet]).all()
+
+
+def test_a_contact_outside_is_at_the_edge():
+    places = np.array([[5.5e-3, 0.0], [3.5e-3, 0.0]])
+    found = GRID.locate(TRUE_GRID.readings(places, 5.0), indenter=ROD, shear=0.0)
+    np.testing.assert_allclose(found.x, places[:, 0], atol=0.1e-3)
+    assert ["edge" in flag for flag in found.flags] == [True, False]
+
+
+def test_a_contact_of_another_size_is_a_misfit():
+    u = TRUE_GRID.readings(np.zeros((1, 2)), 2.0, indenter=memscal.Sphere(radius=50e-3))
+    assert "misfit" in GRID.locate(u, shear=0.0).flags[0]
+
+
+def test_the_error_of_the_load_is_one_of_the_force_alone():
+    """A load that is 2 % too large makes all A 2 % too small, and forces 2 % too large."""
+    effect = np.zeros(len(GRID.root))
+    effect[:16] = -0.02
+    array = replace(GRID, noise=1e-6 * GRID.noise, effects={"load": effect})
+    found = array.locate(
+        TRUE_GRID.readings(np.array([[1e-3, 0.2e-3]]), 1.5), indenter=ROD, shear=0.0
+    )
+    assert found.uncertainties[0, 2] == pytest.approx(0.03, rel=0.02)
+    assert found.uncertainties[0, 0] < 1e-6
+
+
+def test_the_assumed_shear_is_always_said():
+    u = TRUE_GRID.readings(np.zeros((1, 2)), 1.0)
+    found = GRID.locate(u, indenter=ROD)
+    assert found.assumed_shear == 0.3
+    assert "0 ± 0.3 of the normal force" in found.answer()
+    assert "no shear" in GRID.locate(u, indenter=ROD, shear=0.0).answer()
+    assert found.to_dict()["assumed_shear"] == 0.3
+    frame = found.to_dataframe()
+    assert frame["x (mm)"][0] == pytest.approx(0.0, abs=1e-2)
+    assert found.plot().axes
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"u": np.zeros((2, 15))}, ["15 columns", "16 sensors"]),
+        ({"u": np.zeros((2, 16)), "rest": np.zeros(3)}, ["rest has 3 columns", "16 sensors"]),
+        ({"u": np.zeros((2, 16)), "indenter": "rod"}, ["'rod'"]),
+        ({"u": np.zeros((2, 16)), "shear": -1.0}, ["shear is -1"]),
+    ],
+)
+def test_what_makes_no_sense_is_refused(arguments, words):
+    with pytest.raises(memscal.MemscalError) as refused:
+        GRID.locate(**arguments)
+    assert all(word in str(refused.value) for word in words)
+
+
+@pytest.fixture
+def files(tmp_path):
+    """An array, and a table of two frames whose columns are in another order."""
+    ROW.save(tmp_path / "array.h5")
+    u = TRUE_ROW.readings(np.array([[0.5e-3, 0.0], [-1e-3, 0.0]]), 1.0) * 1e3
+    with (tmp_path / "frames.csv").open("w") as file:
+        names = [*reversed(ROW.sensors)]
+        file.write("frame," + ",".join(f"{name} [mV]" for name in names) + "\n")
+        for number, row in zip((7, 9), u, strict=True):
+            file.write(f"{number}," + ",".join(map(str, row[::-1])) + "\n")
+        file.write("11" + "," * len(names) + "\n")
+    return tmp_path
+
+
+def test_the_command_writes_the_table_of_contacts(files, run):
+    arguments = ["locate", files / "array.h5", files / "frames.csv", "-o", files / "c.csv"]
+    done = run(*arguments, "--indenter", "rod:0.25", "--shear", "0", "--json")
+    assert done.code == 0
+    assert faults("locate", json.loads(done.out)) == []
+    lines = (files / "c.csv").read_text().splitlines()
+    assert any(line.startswith("#") and "no shear" in line for line in lines)
+    rows = [*csv.DictReader(line for line in lines if not line.startswith("#"))]
+    assert [*rows[0]][:8] == [
+        "frame",
+        "x [mm]",
+        "x_errors [mm]",
+        "y [mm]",
+        "y_errors [mm]",
+        "force [N]",
+        "force_errors [N]",
+        "flags",
+    ]
+    assert [row["frame"] for row in rows] == ["7", "9", "11"]
+    assert float(rows[0]["x [mm]"]) == pytest.approx(0.5, abs=0.01)
+    assert float(rows[1]["force [N]"]) == pytest.approx(1.0, abs=0.01)
+    assert rows[0]["y_errors [mm]"] == ""
+    assert (rows[2]["x [mm]"], rows[2]["flags"]) == ("", "no reading")
+    assert run(*arguments).code == 4
+
+
+def test_frames_of_another_array_are_refused_and_nothing_is_written(files, run):
+    table = files / "frames.csv"
+    stated = table.read_text()
+    cases = {
+        stated.replace("T03", "X03"): ["T03", "X03", "6 columns", "6 sensors"],
+        "\n".join(line.rpartition(",")[0] for line in stated.splitlines()): ["5 columns", "T00"],
+        stated.replace(" [mV]", ""): ["unit"],
+    }
+    for text, words in cases.items():
+        table.write_text(text)
+        done = run("locate", files / "array.h5", table, "-o", files / "c.csv")
+        assert done.code == 3
+        assert all(word in done.err for word in words)
+        assert not (files / "c.csv").exists()
+
+
+def test_the_artifact_of_one_sensor_is_no_array(files, run):
+    memscal.calibrate(memscal.simulate(seed=1)).apparatus.save(files / "one.h5")
+    done = run("locate", files / "one.h5", files / "frames.csv", "-o", files / "c.csv")
+    assert done.code == 3
+    assert "is the artifact of a single sensor, not of an array" in done.err
