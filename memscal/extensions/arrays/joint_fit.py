@@ -41,14 +41,14 @@ WIDEST = SPREADS[-1]
 #: Standard deviation of what is a sensor's own: ln width, and departures over the Gaussian's size.
 OWN_WIDTH = 0.05
 _OWN_SHAPE = 0.05
-_MOST_ROUNDS = 25
-_SHAPE_ROUNDS = 5
+_FIRST_ROUNDS = 3
+_MOST_ROUNDS = 12
 #: A sensor's own noise is at least this share of its variance, and of its largest reading.
 _LEAST_OWN = 0.02
 _ROUNDING = 1e-7
 #: Steps end below this share of a standard uncertainty.
 _SETTLED = 0.1
-#: The longest step, in ln g or in widths of G.
+#: The longest step of a centre, in widths of G.
 _LONGEST = 0.5
 
 
@@ -167,63 +167,6 @@ def _undetermined() -> FitError:
     )
 
 
-def fit_gaussian(
-    model: JointModel, state: ArrayState, noise: Noise, gaussian: GaussianFit
-) -> tuple[ArrayState, GaussianFit]:
-    """Fit everything with a Gaussian of a common width, by damped Gauss-Newton steps."""
-    layout = model.layout
-    presses = model.presses
-    precision = prior_precision(layout, WIDEST)
-    widths = np.array([gaussian.conversion_constant, gaussian.sigma])
-    k = gaussian.geometry.k
-    best = np.inf
-    step = np.zeros(layout.count + 2)
-    tried = (state, widths)
-    for _ in range(_MOST_ROUNDS):
-        a, sigma = tried[1]
-        columns = np.stack([gaussian_transfer(k, sigma), a * gaussian_transfer_slope(k, sigma)], 1)
-        columns = model.waves.mix @ columns
-        place = replace(tried[0], kernel=a * columns[:, 0])
-        data = presses.u - model.predicted(place)
-        information = model.information(place, noise, columns, data)
-        values = parameters_of(layout, place)
-        cost = information.gram[0, 0] + values @ precision @ values
-        if not cost <= best * (1 + 1e-12):
-            step = step / 2
-            tried = _stepped(model, state, widths, step)
-            continue
-        state, widths, best = place, tried[1], cost
-        matrix = information.gram[1:, 1:].copy()
-        right = information.gram[1:, 0].copy()
-        matrix[: layout.count, : layout.count] += precision
-        right[: layout.count] -= precision @ values
-        normal = Normal(matrix)
-        step = normal.solve(right)
-        decrease = step @ right
-        size = max(
-            abs(step[layout.centres]).max() / sigma,
-            abs(step[: len(presses.u) - 1]).max(initial=0.0),
-            abs(step[-1]) / sigma,
-        )
-        step *= min(1.0, _LONGEST / size)
-        tried = _stepped(model, state, widths, step)
-        if decrease < _SETTLED**2:
-            break
-    a, sigma = widths
-    if not (a > 0 and sigma > 0):
-        raise _undetermined()
-    return state, replace(gaussian, conversion_constant=float(a), sigma=float(sigma))
-
-
-def _stepped(
-    model: JointModel, state: ArrayState, widths: FloatArray, step: FloatArray
-) -> tuple[ArrayState, FloatArray]:
-    moved = model.layout.moved(state, step[:-2], model.presses.axes)
-    changed = widths + step[-2:]
-    # A width has no sign.
-    return moved, np.array([changed[0], max(abs(changed[1]), 0.1 * widths[1])])
-
-
 def noise_of(model: JointModel, state: ArrayState) -> Noise:
     """Estimate each sensor's own noise, and what is common to a board, from what is left."""
     presses = model.presses
@@ -253,11 +196,8 @@ def noise_of(model: JointModel, state: ArrayState) -> Noise:
 def fit_array(
     model: JointModel, state: ArrayState, noise: Noise, gaussian: GaussianFit, forward: ForwardModel
 ) -> JointFit:
-    """Fit an array from a start: a Gaussian first, then the shape of G that is common to all."""
-    for _ in range(2):
-        state, gaussian = fit_gaussian(model, state, noise, gaussian)
-        noise = noise_of(model, state)
-    first = fit_shape(model, state, noise, gaussian, forward)
+    """Fit an array from a start; the noise is that of the residuals."""
+    first = fit_shape(model, state, noise, gaussian, forward, _FIRST_ROUNDS)
     return fit_shape(model, first.state, noise_of(model, first.state), gaussian, forward)
 
 
@@ -267,9 +207,9 @@ def fit_shape(
     noise: Noise,
     gaussian: GaussianFit,
     forward: ForwardModel,
-    rounds: int = _SHAPE_ROUNDS,
+    rounds: int = _MOST_ROUNDS,
 ) -> JointFit:
-    """Fit an array from a fit with a Gaussian, or one without own kernels."""
+    """Fit an array by damped Gauss-Newton steps, each with the shapes of G weighed anew."""
     presses = model.presses
     everything = np.eye(len(model.waves.mix))
     for _ in range(rounds):
@@ -282,7 +222,9 @@ def fit_shape(
         ]
         likeliest = max(weighed, key=attrgetter("log_evidence"))
         best = likeliest.posterior()
-        moved = model.layout.moved(state, best.change, presses.axes)
+        longest = abs(best.change[model.layout.centres]).max() / gaussian.width
+        share = min(1.0, _LONGEST / longest)
+        moved = model.layout.moved(state, share * best.change, presses.axes)
         state = replace(moved, kernel=model.waves.mix @ best.kernel)
         size = np.sqrt(np.sum(best.root[: model.layout.count] ** 2, axis=1))
         if np.all(abs(best.change) < _SETTLED * size):

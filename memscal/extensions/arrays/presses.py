@@ -14,7 +14,7 @@ from memscal.model.scan import Scan
 #: Phase (rad) of the last wavenumber from one radius of a table to the next.
 _PHASE = 0.25
 #: Combinations of waves of less than this share of the largest are not seen.
-_SEEN = 1e-8
+_SEEN = 1e-6
 
 
 @array_record
