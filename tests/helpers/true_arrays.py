@@ -224,7 +224,7 @@ def true_array(
     )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Errors:
     """What keeps the scan of an array from being ideal; shares of the largest reading."""
 
