@@ -78,6 +78,8 @@ Examples:
   memscal import current.csv -o scan.h5 --x x --u current
   memscal import scan.xlsx -o scan.h5 --sheet Data --x Weg --u Spannung --noise 0.04 --missing n.a.
   memscal import log.csv -o scan.h5 --x x --u U --load-column F --holds --figure holds.png
+  memscal import row.csv -o row.h5 --x x --u "u_*" --layout layout.csv
+      --load 1 --radius 0.25 --young-modulus 2.2 --poisson-ratio 0.5 --thickness 2
   memscal import die_00.csv -o die_00.h5 --x x --u U --load 1 --save-recipe recipe.toml
   memscal import dies/*.csv -o scans --recipe recipe.toml --name-pattern "die_{row}_{col}"
   memscal import fem.csv -o rod.h5 --format reference --r r --r-unit mm
@@ -172,7 +174,15 @@ _NAMED = 12
 @option("--x-unit", "UNIT")(
     "Scan: unit of the positions, such as mm.  [default: that of the column's head, x/mm]"
 )
-@option("--u", "COLUMN")("Scan: column of the normal channel's voltage or reading.")
+@option("--u", "COLUMN", multiple=True)(
+    "Scan: column of the normal channel's voltage or reading. May be repeated, and * stands for "
+    "any text: the columns of the sensors of an array, named as their heads without units. Frames "
+    "without positions need no import: memscal locate reads their table."
+)
+@option("--layout", FILE)(
+    "Scan of an array: table of where its sensors are, with the columns sensor, x and y (and "
+    "x_errors, y_errors), units in the heads, and one row for each sensor."
+)
 @option("--u-unit --unit u_unit", "UNIT")(
     "Scan: unit of the readings, of any kind, such as mV, pA, uT, Pa, or 1 of counts.  [default: "
     "that of the column's head]"
@@ -382,7 +392,7 @@ def command(
     options = prepared(tables, kind, options)
     table = tables[0]
     figures = options["figure"] or ()
-    inputs = [*hook("with_drawn_in")(table), options["lab"]]
+    inputs = [*hook("with_drawn_in")(table), options["lab"], options["layout"]]
     out.prove_writable([output, *figures, save_recipe], force=force, inputs=inputs)
     with together():
         with out.working("Reading"):
@@ -410,7 +420,7 @@ def command(
 
 def prepared(tables: Iterable[Path], kind: str, options: Options) -> Options:
     """Return the options as tables of a kind are read with them, or say which are wrong."""
-    given = ("repeat", "missing", "figure", "holds", "position_errors_by_repeat")
+    given = ("u", "repeat", "missing", "figure", "holds", "position_errors_by_repeat")
     options = options | {name: options[name] or None for name in given}
     for table in tables:
         _check_usage(table, kind, hook("is_mesh")(table), options)
@@ -493,13 +503,16 @@ def _example(table: Path, missing: Sequence[str], options: Options) -> str:
     if {*missing} <= {"x", "u"}:
         with suppress(MemscalError):
             columns = open_table(table, **stated_options(options, READING)).names
-    free = [column for column in columns if column not in options.values()]
+    taken = [*options.values(), *(options["u"] or ())]
+    free = [column for column in columns if column not in taken]
     if len(free) < len(missing):
         return "See the examples of `memscal import --help`."
     line = ["memscal", "import", str(table)]
     for name in ("x", "u"):
         if options[name] or name in missing:
-            line += [f"--{name}", options[name] or free.pop(0)]
+            given = options[name] or free.pop(0)
+            for column in [given] if isinstance(given, str) else given:
+                line += [f"--{name}", column]
     return (
         f"The columns of {table.name} are {', '.join(columns[:_NAMED])}. For instance: "
         f"{shlex.join([*line, '-o', f'{table.stem}.h5'])}"

@@ -91,6 +91,9 @@ VIEWS = {
 """Class of a result: the module with its tables, and the function that draws it."""
 
 HOOKS = {
+    "add_up": "extensions.arrays.import_array",
+    "array_scan": "extensions.arrays.import_array",
+    "columns_of_array": "extensions.arrays.import_array",
     "drawn_as": "figures.style",
     "html_image": "figures.report",
     "html_report": "figures.report",

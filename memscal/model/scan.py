@@ -335,9 +335,9 @@ class Scan:
     indenter: RoundIndenter | None = None
     film: ElasticFilm | None = None
     unit: str = "V"
-    sensors: Sequence[str] = ()
+    sensors: tuple[str, ...] = ()
     layout: FloatArray | None = None
-    layout_uncertainty: FloatArray | float | None = None
+    layout_uncertainty: FloatArray | None = None
     used: BoolArray | None = None
     reading_low: FloatArray | None = None
     reading_high: FloatArray | None = None
@@ -531,17 +531,14 @@ class Scan:
         number = len(names)
         u_zz = frozen_array(self.u_zz)
         different = len({*names, ""}) == number + 1 and not isinstance(self.sensors, str)
-        if not different or u_zz.shape[:1] != (number,):
+        if not different or u_zz.shape[:1] != (number,) or self.channels:
             raise InputError(
-                f"The sensors of the scan are {self.sensors!r}, and u_zz has shape {u_zz.shape}.",
+                f"The sensors of the scan are {self.sensors!r}, u_zz has shape {u_zz.shape}, and "
+                f"there are {len(self.channels)} further channels.",
                 why="The first axis of the readings of an array is the sensor.",
-                cure="Give a list of names, one for each sensor, all different and none empty.",
-            )
-        if self.motion == "rest" or self.noise_record is not None or self.channels:
-            raise InputError(
-                "The scan of an array has a noise record, or channels xz or yz.",
-                why="Its noise is that of its readings, and each sensor has one channel.",
-                cure="Leave them out; give a further channel as a sensor of its own.",
+                cure="Give a list of names, one for each sensor, all different and none empty, and "
+                "further channels as sensors of their own. A single sensor has no layout, board or "
+                "range.",
             )
         own: Values = {"sensors": names, "sensor": self.sensor, "u_zz": u_zz}
         shapes = {"u_zz_errors": u_zz.shape, **dict.fromkeys(OF_SENSORS, (number,))}

@@ -222,8 +222,9 @@ def _before_each(
             )
         rows = rows[np.abs(u[rows] - np.median(u[rows])) <= near]
         size[i] = rows.size
-        for name in columns.keys() & {"u_zz", "u_xz", "u_yz"}:
-            columns[name][run] -= columns[name][rows].mean()
+        for name in columns:
+            if name.startswith("u_"):
+                columns[name][run] -= columns[name][rows].mean()
     return size
 
 

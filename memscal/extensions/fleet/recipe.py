@@ -27,7 +27,7 @@ SECTIONS = {
     "indenter": "indenter indenter_name radius radius_uncertainty rod_friction lubrication "
     "lubricant",
     "load": "load load_column load_unit load_uncertainty load_scatter",
-    "sensor": "sensor_name sensor_model channel name_pattern die_pitch gain_uncertainty "
+    "sensor": "layout sensor_name sensor_model channel name_pattern die_pitch gain_uncertainty "
     "gain_curvature_uncertainty roundness_uncertainty shear_sensitivity_uncertainty",
     "equipment": "load_cell load_cell_serial position_error position_errors_by_repeat "
     "position_scale_uncertainty",

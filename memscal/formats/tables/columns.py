@@ -100,7 +100,7 @@ class NamedColumns:
         items = [*wanted.values()]
         for item in items:  # a wrong unit is refused before the work
             to_si(0.0, item.unit, item.dimension, self.where(item.column))
-        asked = [self._index(item.column) for item in items]
+        asked = [self.index_of(item.column) for item in items]
         self.others = ", ".join(n for i, n in enumerate(self.names) if i not in asked)
         # A scan has up to three arrays more than columns, and its file must be read again.
         most = min(MOST_ROWS, MOST_HDF5_BYTES // (8 * (len(wanted) + 3)))
@@ -136,7 +136,7 @@ class NamedColumns:
         self, column: str | int, unit: str | None, option: str, default: str | None = None
     ) -> str:
         """Return the unit of a column: of its head, of the row of units, or the one given."""
-        index = self._index(column)
+        index = self.index_of(column)
         below = self._unit_row[index] if index < len(self._unit_row) else ""
         head = next((u for u in self._cut(self.names[index])[1:] if is_unit(u)), "")
         if below and head and not same_unit(below, head):
@@ -158,6 +158,11 @@ class NamedColumns:
             raise InputError(f"{self.where(column)} states no unit that is known.", cure=cure)
         return chosen.strip()
 
+    @property
+    def heads(self) -> list[str]:
+        """Names of the columns without units."""
+        return [self._cut(name)[0] for name in self.names]
+
     def where(self, column: str | int) -> str:
         """Return file and column as messages name them."""
         return f"{self._name}: column {column!r}"
@@ -174,10 +179,11 @@ class NamedColumns:
         """Return the line of the file of each row, (n,)."""
         return np.concatenate(self._lines_of)
 
-    def _index(self, column: str | int) -> int:
+    def index_of(self, column: str | int) -> int:
+        """Return the number of a column, from 0, that is given by its name, head or number."""
         if isinstance(column, str) and self.names.count(column) == 1:
             return self.names.index(column)
-        heads = [self._cut(name)[0] for name in self.names]
+        heads = self.heads
         sought = str(column)
         if heads.count(sought) > 1:
             named = [n for n, head in zip(self.names, heads, strict=True) if head == sought]

@@ -46,6 +46,8 @@ _RECORDS = {"layout": TableLayout, "conditions": ScanConditions, "uncertainties"
 _READING = ("sheet", "scan", "skip_rows", "missing", "delimiter", "decimal")
 #: Options that name columns, besides x and u.
 ARRAYS = ("y", "repeat", "branch", "u_errors", "load_column", "depth", "u_xz", "u_yz", "time")
+#: Readings that are no further channel.
+_NORMAL = ("u_zz", "u_zz_errors")
 #: Words of a column that tells when the indenter presses.
 _PRESSING = {"false": 0.0, "true": 1.0}
 #: Positions closer than this share of the typical spacing are probably one place, and a table with
@@ -73,7 +75,7 @@ class ImportedScan(Scan):
 def import_table(
     source: Any,
     *,
-    u: Column | None = None,
+    u: Column | Sequence[Column] | None = None,
     x: Column | None = None,
     y: Column | None = None,
     u_errors: Column | None = None,
@@ -103,7 +105,9 @@ def import_table(
         Columns of the positions and of the normal channel's readings, by name, or by number from 1
         where no column has a number as its name (a frame's column 1 is the one named 1).  Of
         positions along one axis, ``y`` alone or with an ``x`` that stays, a line is made.  An
-        HDF5 file that plots a signal against its axis (NXdata) needs neither.
+        HDF5 file that plots a signal against its axis (NXdata) needs neither.  Several ``u``, or
+        one in which ``*`` stands for any text, are the sensors of an array, in their order, named
+        as the heads without units; holds are then found in the sum of all of them.
     u_errors : str or int, optional
         Column of the standard uncertainty of each reading.
     u_xz, u_yz, load_column, branch : str or int, optional
@@ -157,8 +161,9 @@ def import_table(
     layout = layout or TableLayout()
     conditions = conditions or ScanConditions()
     uncertainties = uncertainties or ScanUncertainties()
+    readings = _listed(u)
     named = {
-        "u_zz": u,
+        "u_zz": next(iter(readings), None),
         "u_xz": u_xz,
         "u_yz": u_yz,
         "u_zz_errors": u_errors,
@@ -169,14 +174,20 @@ def import_table(
         "branch": branch,
         "time": time,
     }
-    numbering = [repeat] if isinstance(repeat, str | int) else list(repeat or ())
+    numbering = _listed(repeat)
     named |= {f"repeat {i}": column for i, column in enumerate(numbering)}
     require_sign("sign of the voltage", layout.u_sign)
-    table = open_table(source, named, **{name: getattr(layout, name) for name in _READING})
+    asked = named | {f"reading {i}": column for i, column in enumerate(readings)}
+    table = open_table(source, asked, **{name: getattr(layout, name) for name in _READING})
     named |= table.defaults
+    several = len(readings) > 1 or "*" in str(u)
+    of_array = hook("columns_of_array")(table, readings) if several else {}
+    named |= of_array
     _require_use(named, layout, conditions, uncertainties)
     wanted, reading = _wanted(table, named, layout)
     columns, notes = _read_columns(table, wanted, layout.u_sign, uncertainties.noise)
+    if of_array:
+        notes += hook("add_up")(columns, layout.u_sign)
     presses = make_positions(columns, layout, notes, table.lines)
     if numbering:
         columns["repeat"] = _lines(columns, numbering, notes)
@@ -196,18 +207,27 @@ def import_table(
         if holds.u_errors.all():  # readings of few digits may not scatter
             columns["u_zz_errors"] = holds.u_errors
     of = wanted["u_zz"]
-    at_ceiling = _leave_out_clipped(columns, holds, layout.ceiling, of, reading, notes)
+    ceiling = None if of_array else layout.ceiling
+    at_ceiling = _leave_out_clipped(columns, holds, ceiling, of, reading, notes)
     columns = _placed(columns, notes, (lambda _: "of holds") if holds else table.lines)
     columns = without_dead_rows(columns, notes)
-    scan = _scan_of(columns, notes, reading, conditions, uncertainties, table, holds)
+    bare = replace(conditions, layout=None) if of_array else conditions
+    scan = _scan_of(columns, notes, reading, bare, uncertainties, table, holds)
     scan = replace(scan, at_ceiling=at_ceiling)
+    one: Scan = scan
+    if of_array:
+        scan, one = hook("array_scan")(scan, conditions.layout, layout.ceiling, of)
     del columns  # the scan has copies, and ten million rows are many
     warn_of_readings(scan)
     if scan.film is not None:
         require_film = require_plausible if isinstance(scan.indenter, Rod) else require_span
-        require_film(scan)
+        require_film(one)
     require_depth(scan)
     return scan
+
+
+def _listed(column: Column | Sequence[Column] | None) -> list[Column]:
+    return [column] if isinstance(column, str | int) else list(column or ())
 
 
 def scan_of_arrays(x: ArrayLike, u: ArrayLike, **options: Any) -> ImportedScan:
@@ -323,8 +343,9 @@ def _wanted(
         if column is None:
             continue
         wanted[name] = Wanted(column, words=BRANCHES)
-        if name in forms:
-            dimension, unit, option, default = forms[name]
+        form = name.partition(" of ")[0]  # of a sensor of an array
+        if form in forms:
+            dimension, unit, option, default = forms[form]
             unit = table.unit_of(column, unit, option, default)
             dimension = dimension or dimension_in("voltage", reading_of(unit, table.where(column)))
             wanted[name] = Wanted(column, unit, dimension, _PRESSING if name == "depth" else {})
@@ -408,7 +429,8 @@ def _scan_of(
     if "y" not in columns and "normal_load" in columns:
         messages += _mixed_loads(columns["normal_load"], columns.get("repeat"), conditions.indenter)
     columns = _as_rows(columns)
-    channels: Columns = {n: columns.pop(n) for n in ("u_xz", "u_yz") if n in columns}
+    further = [name for name in columns if name.startswith("u_") and name not in _NORMAL]
+    channels: Columns = {name: columns.pop(name) for name in further}
     if load_scatter is not None:
         columns["normal_load_errors"] = load_scatter * columns["normal_load"]
     if x_error is not None:

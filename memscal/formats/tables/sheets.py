@@ -208,7 +208,7 @@ class FrameTable(NamedColumns):
         lines = range(1, self._rows + 1)
         yield lines, [self._converted(item, lines) for item in wanted]
         # Others of texts are looked at in memory: those of a file would have to be read.
-        read = [self._index(item.column) for item in wanted]
+        read = [self.index_of(item.column) for item in wanted]
         for i in range(len(self.names) if self.source is None else 0):
             values = np.asarray(self._column(i), dtype=object).ravel()
             text = "".join(value for value in values if isinstance(value, str))
@@ -219,7 +219,7 @@ class FrameTable(NamedColumns):
                 self._numbers(cells, lines, self._others[-1])
 
     def _converted(self, item: Wanted, lines: Lines) -> FloatArray:
-        index = self._index(item.column)
+        index = self.index_of(item.column)
         with _reading(f"{self._name} cannot be read"):
             values = np.asarray(unmasked(self._column(index)))
         if values.shape != (self._rows,):

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import field
-from typing import Literal
+from typing import Any, Literal
 
 from memscal.model.arrays import FloatArray, keyword_value_record
 from memscal.model.film import ElasticFilm
@@ -94,6 +94,9 @@ class ScanConditions:
         Way over which each reading is the mean, in m; time at each place before it, in s.
     lubrication, lubricant : str
         ``"dry"`` or ``"lubricated"``, and the name of the lubricant.
+    layout : path, data frame or mapping, optional
+        Where the sensors of an array are: a table with columns sensor (the name), x, y and,
+        optionally, x_errors and y_errors, with units in the heads; each sensor exactly once.
     sensor, load_cell, stage, user
         What measured the stress, the load and the position, and who measured.
     direction : str, optional
@@ -122,6 +125,7 @@ class ScanConditions:
     dwell_time: float | None = None
     lubrication: str = ""
     lubricant: str = ""
+    layout: Any = None
     sensor: StressSensor = field(default_factory=StressSensor)
     load_cell: LoadCell = field(default_factory=LoadCell)
     stage: Equipment = field(default_factory=Equipment)

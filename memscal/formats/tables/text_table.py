@@ -308,7 +308,7 @@ class TextTable(NamedColumns):
             yield rest
 
     def _parts(self, wanted: list[Wanted]) -> Parts:
-        indices = [self._index(item.column) for item in wanted]
+        indices = [self.index_of(item.column) for item in wanted]
         rows, places = self._first
         for left, top, right, bottom in self._sheet.merged if self._sheet else ():
             if bottom >= places[0] and any(left <= i + 1 <= right for i in indices):

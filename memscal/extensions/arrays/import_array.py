@@ -1,0 +1,99 @@
+"""What the import of a table of an array does beyond that of a single sensor's."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import chain
+from typing import Any
+
+import numpy as np
+
+from memscal.errors import InputError
+from memscal.formats.tables.columns import NamedColumns, Wanted
+from memscal.formats.tables.dialect import is_number
+from memscal.formats.tables.scan import ImportedScan
+from memscal.formats.tables.sheets import open_table
+from memscal.formats.units import to_si
+from memscal.model.arrays import Columns, Values
+from memscal.model.scan import Scan
+
+#: Begins the names of the readings of each sensor, of which ``u_zz`` is the sum.
+_OF = "u_zz of "
+
+
+def columns_of_array(table: NamedColumns, asked: Sequence[str | int]) -> dict[str, str]:
+    """Return the columns of the sensors, by the names of their readings; ``*`` is any text."""
+    heads = table.heads
+    numbers: list[int] = []
+    for column in asked:
+        pattern = re.escape(str(column)).replace(r"\*", ".+")
+        found = [i for i, head in enumerate(heads) if re.fullmatch(pattern, head)]
+        numbers += found if "*" in str(column) and found else [table.index_of(column)]
+    named = {_OF + heads[i]: table.names[i] for i in numbers}
+    if len(named) < len(numbers):
+        raise InputError(
+            f"The columns of the sensors are {', '.join(heads[i] for i in numbers)}.",
+            why="The name of a sensor is the head of its column, and tells it from the others.",
+            cure="Name each column once (--u), and rename columns of the same name.",
+        )
+    return {"u_zz": table.names[numbers[0]], **(named if len(named) > 1 else {})}
+
+
+def add_up(columns: Columns, u_sign: int) -> list[str]:
+    """Make ``u_zz`` the sum of all sensors' readings, which get their sign; return a note."""
+    names = [name for name in columns if name.startswith(_OF)]
+    total = np.zeros(columns["u_zz"].shape)
+    for name in names:
+        columns[name] *= u_sign
+        if not np.isnan(columns[name]).all():  # one without readings changes no other's
+            total += columns[name]
+    columns["u_zz"] = total
+    return [f"An array of {len(names)} sensors; u_zz is their sum where holds are found in it."]
+
+
+def array_scan(
+    scan: ImportedScan, layout: Any, ceiling: float | None, of: Wanted
+) -> tuple[ImportedScan, Scan]:
+    """Return the scan of an array, of that of the sum; and that of the sensor that reads most."""
+    channels = dict(scan.channels)
+    stored = [name for name in channels if name.startswith(_OF)]
+    u_zz = np.stack([channels.pop(name) for name in stored])
+    names = [name.removeprefix(_OF) for name in stored]
+    stated: Values = {} if layout is None else read_layout(layout, names)
+    if ceiling is not None:  # a calibration leaves out what is there, and says of which sensor
+        stated["reading_high"] = to_si(ceiling, of.unit, of.dimension, "ceiling (--ceiling)")
+    stated["u_zz_errors"] = None  # those of holds are those of the sum
+    if scan.u_zz_errors is not None and scan.holds is None:
+        stated["u_zz_errors"] = np.broadcast_to(scan.u_zz_errors, u_zz.shape)
+    array = replace(scan, u_zz=u_zz, channels=channels, sensors=tuple(names), **stated)
+    most = int(np.nan_to_num(u_zz).argmax()) // scan.u_zz.size
+    return array, array.of_sensor(most)
+
+
+def read_layout(source: Any, sensors: Sequence[str]) -> Values:
+    """Return layout and layout_uncertainty, in m, of a table that names each sensor once."""
+    table = open_table(source)
+    # Cells that are all numbers are read as numbers, and others as the place of their word.
+    numeric = all(map(is_number, sensors))
+    keys = [float(name) if numeric else i for i, name in enumerate(sensors)]
+    words = {name.lower(): key for name, key in zip(sensors, keys, strict=True)}
+    fields = {"layout": ("x", "y")}
+    if "x_errors" in table.heads:
+        fields["layout_uncertainty"] = ("x_errors", "y_errors")
+    wanted = {"sensor": Wanted("sensor", words=words)}
+    for name in chain(*fields.values()):
+        wanted[name] = Wanted(name, table.unit_of(name, None, "x [mm]"), "length")
+    columns = table.columns(wanted)
+    found = columns["sensor"].tolist()
+    if sorted(found) != sorted(keys):
+        raise InputError(
+            f"{table.where('sensor')} does not name each of these exactly once: "
+            f"{', '.join(sensors)}.",
+            why="A layout says where each sensor is, by the name of its column of readings.",
+            cure="Give each sensor one row, and no other.",
+        )
+    order = [found.index(key) for key in keys]
+    return {
+        field: np.column_stack([columns[name] for name in names])[order]
+        for field, names in fields.items()
+    }
