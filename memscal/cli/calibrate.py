@@ -33,6 +33,7 @@ from memscal.cli.options import (
     rod_friction_option,
     scans_argument,
 )
+from memscal.extensions import hook
 from memscal.formats.files import together
 
 if TYPE_CHECKING:
@@ -47,7 +48,6 @@ _MOST_WORKERS = 8
 
 def _drawn(calibration: Calibration, draws: int, seed: int) -> Any:
     """Draw in processes, show how many draws are done, and where they and the budget disagree."""
-    from memscal.extensions import hook
     from memscal.model.checks import Message
     from memscal.model.quantities import estimated_quantity
 
@@ -128,6 +128,7 @@ Examples:
   memscal calibrate scan.h5 --method tikhonov --option amplitude=0.5
   memscal calibrate scan.h5 --method bayesian --monte-carlo 1000
   memscal calibrate scan.h5 --channel xz
+  memscal calibrate array_scan.h5 -o array.h5 --kernel auto --crosstalk nearest
 """
 
 
@@ -221,8 +222,18 @@ def calibration_settings(
 
 @click.command("calibrate", epilog=EXAMPLES)
 @scans_argument()
-@out_option("Artifact to write; by default SCAN.apparatus.h5 beside SCAN.h5.")
+@out_option(
+    "Artifact to write; by default SCAN.apparatus.h5 beside SCAN.h5, of an array SCAN.array.h5."
+)
 @calibration_options
+@option("--kernel", click.Choice(("common", "own", "auto", "measured")))(
+    "Array: one G of all sensors; a G of each; these where the evidence of a raster prefers them; "
+    "or maps of what each sensor reads, without G and pascals.  [default: common]"
+)
+@option("--crosstalk", click.Choice(("auto", "none", "nearest", "full")))(
+    "Array: pairs whose crosstalk is estimated: of neighbours, none, or all.  [default: auto, "
+    "which is nearest]"
+)
 @option("--free", click.Choice(("thickness",)), multiple=True)(
     "Estimate the film's thickness, too, from scans with several rods, or at several loads on a "
     "film of a stated law that is not linear; the stated thickness is its prior."
@@ -279,11 +290,18 @@ def command(
     Several scans, at other loads, with other rods or films, are fitted together: A and G are
     shared, and each scan has its own centre and baseline.
 
+    The scan of an array of sensors is calibrated as an array: A of each sensor, what it reads of
+    its neighbours (crosstalk), places, and the shape of G.
+
     A failed quality check is exit code 1: the artifact is written and states it.
     """
+    code: int | None = hook("calibrated_array")(click.get_current_context())
+    if code is not None:
+        return code
     channel = settings["channel"]
     ending = ".apparatus.h5" if channel == "zz" else f".{channel}.apparatus.h5"
     output = output or out.default_name(scans[0], ending)
+    del settings["kernel"], settings["crosstalk"]  # of an array
     settings = calibration_settings(reference=reference, alternative=alternative, **settings)
     data = _read(scans, reference, noise_record, settings)
     outputs = list(filter(None, (output, report, *figures, sweep_figure)))

@@ -15,10 +15,16 @@ def require_schema(file: SafeFile, schema: str) -> str:
     stored = file.attribute("/", writer.SCHEMA_ATTRIBUTE)
     if stored != schema:
         held = "no memscal schema" if stored is None else f'the schema "{stored}"'
+        cure = "Give the right file, or make one with `memscal import` or `memscal calibrate`."
+        if stored == writer.ARRAY_SCHEMA:
+            cure = (
+                "It is that of an array of sensors, for `memscal locate` and memscal.load_array; "
+            )
+            cure += "an artifact of one of them is array.sensor(name)."
         raise FormatError(
             f'{file.name} has {held}, but "{schema}" is needed here.',
             why=f"The root attribute {writer.SCHEMA_ATTRIBUTE} names what a file holds.",
-            cure="Give the right file, or make one with `memscal import` or `memscal calibrate`.",
+            cure=cure,
         )
     version = str(file.attribute("/", VERSION_ATTRIBUTE) or "")
     major = version.partition(".")[0]

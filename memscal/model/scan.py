@@ -534,7 +534,7 @@ class Scan:
         if not different or u_zz.shape[:1] != (number,) or self.channels:
             raise InputError(
                 f"The sensors of the scan are {self.sensors!r}, u_zz has shape {u_zz.shape}, and "
-                f"there are {len(self.channels)} further channels.",
+                f"further channels are: {', '.join(self.channels) or 'none'}.",
                 why="The first axis of the readings of an array is the sensor.",
                 cure="Give a list of names, one for each sensor, all different and none empty, and "
                 "further channels as sensors of their own. A single sensor has no layout, board or "

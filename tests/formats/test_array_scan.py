@@ -59,7 +59,7 @@ def test_the_scan_of_an_array_comes_back_and_holds_that_of_each_sensor(kind):
         ({"layout": [0, 1, 2]}, r"layout of the scan has shape \(3,\).*\(3, 2\)"),
         ({"layout": [[0, 0], [1, np.nan], [2, 0]]}, "finite"),
         ({"reading_high": [1, 2]}, r"should be \(3,\)"),
-        ({"channels": {"u_xz": np.ones((3, 33))}}, "sensor of its own"),
+        ({"channels": {"u_xz": np.ones((3, 33))}}, "further channels are: u_xz"),
         ({"sensors": (), "u_zz": np.ones(33)}, "sensors of the scan are"),
     ],
 )
@@ -95,7 +95,7 @@ def turned(data):
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        (renamed("T00", "T01"), r"\['T00', 'T01'\], and u_zz has shape \(3, 33\)"),
+        (renamed("T00", "T01"), r"\['T00', 'T01'\], u_zz has shape \(3, 33\)"),
         (renamed("T00", "T01", "T00"), "all different"),
         (without("sensor_names"), r"sensor as axis 0(.|\n)*sensor_names"),
         (without("layout_y"), "finite"),

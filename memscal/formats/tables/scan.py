@@ -182,11 +182,12 @@ def import_table(
     named |= table.defaults
     several = len(readings) > 1 or "*" in str(u)
     of_array = hook("columns_of_array")(table, readings) if several else {}
+    array = len(of_array) > 1
     named |= of_array
     _require_use(named, layout, conditions, uncertainties)
     wanted, reading = _wanted(table, named, layout)
     columns, notes = _read_columns(table, wanted, layout.u_sign, uncertainties.noise)
-    if of_array:
+    if array:
         notes += hook("add_up")(columns, layout.u_sign)
     presses = make_positions(columns, layout, notes, table.lines)
     if numbering:
@@ -207,15 +208,15 @@ def import_table(
         if holds.u_errors.all():  # readings of few digits may not scatter
             columns["u_zz_errors"] = holds.u_errors
     of = wanted["u_zz"]
-    ceiling = None if of_array else layout.ceiling
+    ceiling = None if array else layout.ceiling
     at_ceiling = _leave_out_clipped(columns, holds, ceiling, of, reading, notes)
     columns = _placed(columns, notes, (lambda _: "of holds") if holds else table.lines)
     columns = without_dead_rows(columns, notes)
-    bare = replace(conditions, layout=None) if of_array else conditions
+    bare = replace(conditions, layout=None) if array else conditions
     scan = _scan_of(columns, notes, reading, bare, uncertainties, table, holds)
     scan = replace(scan, at_ceiling=at_ceiling)
     one: Scan = scan
-    if of_array:
+    if array:
         scan, one = hook("array_scan")(scan, conditions.layout, layout.ceiling, of)
     del columns  # the scan has copies, and ten million rows are many
     warn_of_readings(scan)
