@@ -36,7 +36,7 @@ _SHORT = 0.1
 
 
 class Failing(NamedTuple):
-    """A check, and the numbers of the used sensors that fail it."""
+    """A check, and the numbers of the sensors that fail it."""
 
     check: QualityCheck
     sensors: IndexArray | tuple[()] = ()
@@ -47,17 +47,12 @@ def array_checks(
 ) -> tuple[tuple[QualityCheck, ...], dict[str, tuple[str, ...]]]:
     """Check a fit, against one with own widths or shapes, or a common one; name failing sensors."""
     names = np.array(array.sensors)
-    results = {}
     failing = {}
-    used = np.flatnonzero(found.used)
-    for each in _of_all(array, found):
-        results[each.check.name] = each.check
-        failing[each.check.name] = tuple(names[np.asarray(each.sensors, np.intp)].tolist())
-    for each in _of_fit(fit, compared, array):
-        results[each.check.name] = each.check
-        numbers = used[np.asarray(each.sensors, np.intp)]
+    results = [*_of_all(array, found), *_of_fit(fit, compared, array)]
+    for each in results:
+        numbers = np.asarray(each.sensors, np.intp)
         failing[each.check.name] = tuple(names[numbers].tolist())
-    return tuple(results.values()), failing
+    return tuple(each.check for each in results), failing
 
 
 def _of_all(array: ArrayData, found: Sorted) -> Iterator[Failing]:
@@ -132,16 +127,15 @@ def _layout(array: ArrayData) -> Failing:
 
 
 def _of_fit(fit: JointFit, compared: JointFit, array: ArrayData) -> Iterator[Failing]:
-    near = fit.model.layout.crosstalk >= 0
-    if near.any():
-        yield _identified(fit, near)
+    several = array.used.sum() > 1
+    if array.estimated.any():
+        yield _identified(fit, array.estimated)
     # With shapes of their own none is assumed to be common.
-    if len(near) > 1 and not fit.model.layout.own.size:
-        if near.any():
-            yield _models_agree(fit, compared)
+    if several and not fit.model.layout.own.size:
+        yield _models_agree(fit, compared)
         yield _common_kernel(compared)
     yield _chi_square(fit, array)
-    if len(near) > 1:
+    if several:
         yield _press_errors(fit)
         yield _common_mode(fit)
 
@@ -174,20 +168,21 @@ def _identified(fit: JointFit, near: BoolArray) -> Failing:
 
 def _models_agree(fit: JointFit, compared: JointFit) -> Failing:
     """Compare A and crosstalk by common and by own shapes: of nested models, as Hausman's test."""
+    used = np.flatnonzero(fit.model.presses.used)
+    near = fit.model.layout.crosstalk >= 0
     both = []
     # How wide the prior of the crosstalk is may differ between them.
     for each in (fit.by_widest, compared.by_widest):
         numbers = array_numbers(each, each.posterior, each.posterior.root)
-        crosstalk = each.state.crosstalk[each.model.layout.crosstalk >= 0]
-        roots = [numbers.of_a, numbers.of_crosstalk[each.model.layout.crosstalk >= 0]]
-        variance = np.sum(np.vstack(roots) ** 2, axis=1)
-        both.append((np.append(numbers.log_a, crosstalk), variance))
+        roots = np.vstack([numbers.of_a[used], numbers.of_crosstalk[near]])
+        values = np.append(numbers.log_a[used], each.state.crosstalk[near])
+        both.append((values, np.sum(roots**2, axis=1)))
     difference = both[0][0] - both[1][0]
     # The variance of the difference is that of the variances, at least a share of the larger one.
     larger = np.maximum(both[0][1], both[1][1])
     apart = np.maximum(abs(both[0][1] - both[1][1]), _LEAST_APART * larger)
     z = difference / np.sqrt(apart)
-    m = len(fit.state.gain)
+    m = used.size
     return Failing(
         check(
             "crosstalk_model",
@@ -197,31 +192,29 @@ def _models_agree(fit: JointFit, compared: JointFit) -> Failing:
             "uncertainty, root mean square. A failure means that the sensors' shapes differ: take "
             "own ones, of a raster.",
         ),
-        np.flatnonzero(abs(z[:m]) > chdtri(1, FALSE_ALARM / m) ** 0.5),
+        used[abs(z[:m]) > chdtri(1, FALSE_ALARM / m) ** 0.5],
     )
 
 
 def _common_kernel(own: JointFit) -> Failing:
     """Test whether widths differ, where the common shape is free."""
-    layout = own.model.layout
+    used = np.flatnonzero(own.model.presses.used)
+    places = own.model.layout.own[used, 0]
     gram = own.information.gram
-    widths = 1 + layout.own[:, 0]
-    rest = np.delete(np.arange(1, len(gram)), layout.own.ravel())
     scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
     scaled = gram / np.outer(scale, scale)
+    widths = 1 + places
+    rest = np.delete(np.arange(1, len(gram)), places)
     inverse = np.linalg.pinv(scaled[np.ix_(rest, rest)], rcond=1e-10, hermitian=True)
-    explained = inverse @ scaled[np.ix_(rest, np.append(widths, 0))]
-    left = scaled[np.ix_(widths, np.append(widths, 0))] - scaled[np.ix_(widths, rest)] @ explained
-    information = left[:, :-1]
+    left = scaled - scaled[:, rest] @ inverse @ scaled[rest]
+    information = left[np.ix_(widths, widths)]
     # The readings were linearised before the last step.
-    before = own.state.own[:, 0] - own.posterior.change[layout.own[:, 0]]
-    data = left[:, -1] * scale[0] + information @ (before * scale[widths])
-    values, vectors = np.linalg.eigh(information)
-    told = values > 1e-8 * values[-1]
-    found = vectors.T @ data
-    square = np.sum(found[told] ** 2 / values[told])
-    degrees = min(int(told.sum()), len(widths) - 1)
-    z = abs(own.state.own[:, 0]) / np.linalg.norm(own.posterior.root[layout.own[:, 0]], axis=1)
+    before = own.state.own[used, 0] - own.posterior.change[places]
+    data = left[widths, 0] * scale[0] + information @ (before * scale[widths])
+    # A common width is one of the common shape.
+    square = data @ np.linalg.pinv(information, rcond=1e-8, hermitian=True) @ data
+    degrees = used.size - 1
+    z = abs(own.state.own[used, 0]) / np.linalg.norm(own.posterior.root[places], axis=1)
     return Failing(
         check(
             "common_kernel",
@@ -231,39 +224,41 @@ def _common_kernel(own: JointFit) -> Failing:
             "failure means that one G does not describe all of them.",
             float(chdtrc(degrees, square)),
         ),
-        np.flatnonzero(z > -ndtri(FALSE_ALARM / z.size)),
+        used[z > -ndtri(FALSE_ALARM / z.size)],
     )
 
 
 def _chi_square(fit: JointFit, array: ArrayData) -> Failing:
     """Compare the residuals of each sensor with the noise: as stated, or between neighbours."""
     presses = fit.model.presses
-    count = presses.keep.sum(axis=1)
-    residual = fit.residual
+    used = np.flatnonzero(array.used)
+    keep = presses.keep[used]
+    count = keep.sum(axis=1)
+    square = fit.residual[used] ** 2
     if presses.stated is not None:
-        variance = presses.stated**2 + np.sum(fit.model.press_errors(fit.state) ** 2, axis=0)
-        ratio = np.sum(residual**2 / variance, axis=1, where=presses.keep) / count
+        errors = fit.model.press_errors(fit.state)[:, used]
+        variance = presses.stated[used] ** 2 + np.sum(errors**2, axis=0)
+        ratio = np.mean(square / variance, axis=1, where=keep)
     else:
-        step = np.diff(residual, axis=1)
-        both = presses.keep[:, 1:] & presses.keep[:, :-1]
-        between = np.mean(step**2, axis=1, where=both) / 2
-        ratio = np.mean(residual**2, axis=1, where=presses.keep) / between
+        between = np.diff(fit.residual[used], axis=1) ** 2 / 2
+        neighbours = keep[:, 1:] & keep[:, :-1]
+        ratio = np.mean(square, axis=1, where=keep) / np.mean(between, axis=1, where=neighbours)
     # Of the ratio of the mean square to that of steps the variance is 1/n, of chi-square 2/n.
     spread = np.sqrt((1.0 if presses.stated is None else 2.0) / count)
     beyond = (ratio - 1) / spread
+    most = -ndtri(FALSE_ALARM / used.size)
     worst = int(np.argmax(beyond))
-    limit = 1 - ndtri(FALSE_ALARM / beyond.size) * spread[worst]
-    name = array.sensors[np.flatnonzero(array.used)[worst]]
+    name = array.sensors[used[worst]]
     return Failing(
         check(
             "array_chi_square",
             ratio[worst],
-            limit,
+            1 + most * spread[worst],
             "Mean square of the residuals over the noise, as stated or as neighbouring readings "
             f"have it, of the worst sensor, {name}. A failure means that the model misses "
             "something: reference, crosstalk of farther pairs, drift, memory of the film.",
         ),
-        np.flatnonzero(beyond > -ndtri(FALSE_ALARM / beyond.size)),
+        used[beyond > most],
     )
 
 
@@ -299,7 +294,8 @@ def _common_mode(fit: JointFit) -> Failing:
     apart = fit.residual @ fit.residual.T / count - expected
     z = abs(apart / np.outer(scale, scale)) * np.sqrt(count)
     np.fill_diagonal(z, 0.0)
-    limit = float(-ndtri(FALSE_ALARM / (len(z) * (len(z) - 1))))
+    used = fit.model.presses.used.sum()
+    limit = float(-ndtri(FALSE_ALARM / (used * (used - 1))))
     return Failing(
         check(
             "common_mode",

@@ -8,6 +8,7 @@ import numpy as np
 
 from memscal.extensions.arrays.array_data import ALL, KernelModes
 from memscal.extensions.arrays.joint_fit import JointFit, Posterior
+from memscal.extensions.arrays.joint_model import taken
 from memscal.model.arrays import Arrays, BoolArray, FloatArray, array_record
 
 #: Modes of the kernel of less than this share of the largest are nothing, and no more than so many.
@@ -39,22 +40,19 @@ def array_numbers(fit: JointFit, posterior: Posterior, columns: FloatArray) -> A
     kernels = (posterior.kernel[:, None] + shown).T
     changes = np.repeat(columns[None, layout.count :], len(kernels), axis=0)
     for j, places in enumerate(layout.own):
-        changes[j % len(kernels)] += model.own_kernels @ columns[places]
+        changes[j % len(kernels)] += model.own_kernels @ taken(columns, places)
     total = wavenumbers.integrals(kernels.T)
     integrals = np.stack([wavenumbers.integrals(change) for change in changes])
     of_total = integrals / total[:, None]
-    gains = np.where((layout.gains < 0)[:, None], 0.0, columns[layout.gains])
     centres = np.zeros((2, m, columns.shape[1]))
-    centres[list(model.presses.axes)] = columns[layout.centres]
-    estimated = layout.crosstalk >= 0
-    crosstalk = np.where(estimated[:, :, None], columns[layout.crosstalk], 0.0)
+    centres[list(model.presses.axes)] = taken(columns, layout.centres)
     transfer = kernels / total[:, None]
     of_transfer = changes / total[:, None, None] - transfer[:, :, None] * of_total[:, None]
     return ArrayNumbers(
         np.log(fit.state.gain) + np.log(total),
-        gains + of_total,
+        taken(columns, layout.gains) + of_total,
         centres,
-        crosstalk,
+        taken(columns, layout.crosstalk),
         transfer,
         of_transfer,
     )
@@ -82,17 +80,6 @@ def stacked(numbers: ArrayNumbers, estimated: BoolArray, modes: FloatArray) -> F
     """Return columns of all parameters of an array, (p, c), in their order."""
     parts = [numbers.of_a, *numbers.of_centres, numbers.of_crosstalk[estimated], modes]
     return np.vstack(parts)
-
-
-def of_all_sensors(columns: FloatArray, used: BoolArray) -> FloatArray:
-    """Spread columns of the used sensors' parameters to those of all, with zeros between."""
-    m = used.sum()
-    n = used.size
-    spread = np.zeros((3 * n + len(columns) - 3 * m, columns.shape[1]))
-    places = np.flatnonzero(np.tile(used, 3))
-    spread[places] = columns[: 3 * m]
-    spread[3 * n :] = columns[3 * m :]
-    return spread
 
 
 def input_columns(fit: JointFit, products: Mapping[str, FloatArray]) -> Arrays:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from os import PathLike
-from typing import Any, Literal, NamedTuple, get_args
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 
@@ -28,11 +28,10 @@ from memscal.extensions.arrays.array_numbers import (
     array_numbers,
     input_columns,
     kernel_modes,
-    of_all_sensors,
     stacked,
 )
 from memscal.extensions.arrays.joint_fit import JointFit, fit_array, fit_shape
-from memscal.extensions.arrays.joint_model import ArrayState, JointModel, Layout, Noise
+from memscal.extensions.arrays.joint_model import ArrayState, JointModel, Layout, Noise, taken
 from memscal.extensions.arrays.presses import (
     Presses,
     Sorted,
@@ -213,8 +212,7 @@ def calibrate_array(
     strongest = singles[int(np.argmax(np.where(found.used, found.peak, -np.inf)))]
     prepared = prepare((strongest,), request)
     presses = _presses(opened, prepared, found, places, u)
-    begun = _begun(opened, prepared, found, presses, crosstalk)
-    fit = fit_array(*begun)
+    fit = fit_array(*_begun(opened, prepared, found, presses, crosstalk))
     own = kernel == "own" or (kernel == "auto" and strongest.planar)
     compared = _own_fit(fit, shapes=own)
     if kernel == "own" or (own and compared.log_evidence > fit.log_evidence):
@@ -252,8 +250,7 @@ def _presses(
     errors = np.zeros(u.shape[1])
     if scan.normal_load_errors is not None:
         errors = np.ravel(scan.normal_load_errors) / loads
-    used = found.used
-    keep = found.keep[used] & np.isfinite(loads)
+    keep = found.keep & np.isfinite(loads)
     x_errors = np.zeros(scan.x.size) if scan.x_errors is None else scan.x_errors
     axes = (0, 1) if single.planar else ((0,) if single.direction == "x" else (1,))
     drift = [np.ones(u.shape[1])]
@@ -261,31 +258,26 @@ def _presses(
         half = np.ptp(places[axis]) / 2
         drift.append((places[axis] - places[axis].min()) / half - 1)
     stated = scan.u_zz_errors
-    if stated is not None:
-        stated = stated.reshape(u.shape)[used]
     board = np.zeros(len(u), np.intp) if scan.board is None else scan.board
     return Presses(
         places=places,
         load=np.where(np.isfinite(loads), loads, 0.0),
-        u=np.where(keep, u[used], 0.0),
+        u=np.where(keep, u, 0.0),
         keep=keep,
         drift=np.stack(drift, axis=1),
         axes=axes,
         place_errors=np.broadcast_to(x_errors, scan.shape).ravel(),
         load_errors=np.where(np.isfinite(errors), errors, 0.0),
-        board=np.unique(board[used], return_inverse=True)[1],
-        stated=stated,
+        board=np.unique(board, return_inverse=True)[1],
+        stated=None if stated is None else stated.reshape(u.shape),
     )
 
 
 def _pairs(
-    scan: Scan,
-    used: BoolArray,
-    places: FloatArray,
-    crosstalk: CrosstalkModel | Sequence[tuple[str, str]],
+    scan: Scan, places: FloatArray, crosstalk: CrosstalkModel | Sequence[tuple[str, str]]
 ) -> BoolArray:
     """Return which sensors (rows) read which others, (n, n), at places (n, 2), NaN if unknown."""
-    n = used.size
+    n = len(places)
     if not isinstance(crosstalk, str):
         pairs = np.zeros((n, n), bool)
         for row, column in crosstalk:
@@ -301,15 +293,6 @@ def _pairs(
     distance = np.hypot(*(places[:, None] - places).T)
     near: BoolArray = distance <= _NEIGHBOURS * np.nanmin(distance[apart])
     return apart & near
-
-
-def _all_places(scan: Scan, used: BoolArray, centres: FloatArray) -> FloatArray:
-    """Return the places of all sensors, (n, 2): of dead ones by the layout, NaN without one."""
-    places = np.full((used.size, 2), np.nan)
-    places[used] = centres
-    if scan.layout is not None and used.sum() > 1:
-        places[~used] = fitted_layout(scan.layout, centres, used)[~used]
-    return places
 
 
 def _begun(
@@ -338,36 +321,35 @@ def _begun(
         geometry=forward.geometry(alone.centre),
     )
     used = found.used
-    high = np.maximum(presses.u - found.baseline[used, None], 0.0) * presses.keep
-    high[high < _HIGH * found.peak[used, None]] = 0.0
-    centres = (high @ presses.places.T) / high.sum(axis=1)[:, None]
-    largest = int(np.argmax(found.peak[used]))
-    everywhere = _all_places(scan, used, centres)
-    layout = everywhere if scan.layout is None else scan.layout
-    pairs = _pairs(scan, used, layout, crosstalk)[used]
-    # Neighbours may read what a dead sensor does not tell.
-    leaking = pairs[:, ~used] & np.isfinite(everywhere[~used, 0])
-    reach = np.hypot(*np.ptp(presses.places, axis=1))
-    waves = Waves.of(references[0], reach)
-    parameters = Layout.of(presses, pairs[:, used], leaking, largest, 0)
-    none = np.zeros((forward.k.size, 0))
-    model = JointModel(presses, waves, parameters, np.nan_to_num(everywhere[~used]), none)
-    drift = np.zeros((used.sum(), presses.drift.shape[1]))
-    drift[:, 0] = found.baseline[used]
-    peak = found.peak[used]
+    high = np.maximum(presses.u - found.baseline[:, None], 0.0) * presses.keep
+    high[high < _HIGH * found.peak[:, None]] = 0.0
+    total = np.where(used, high.sum(axis=1), np.nan)
+    centres = high @ presses.places.T / total[:, None]
+    layout = centres
+    if scan.layout is not None:
+        layout = fitted_layout(scan.layout, centres[used], used)
+        # Neighbours may read what a dead sensor does not tell.
+        centres = np.where(used[:, None], centres, layout)
+    pairs = _pairs(scan, layout, crosstalk) & used[:, None] & np.isfinite(centres[:, 0])
+    largest = int(np.argmax(np.where(used, found.peak, 0.0)))
+    waves = Waves.of(references[0], np.hypot(*np.ptp(presses.places, axis=1)))
+    parameters = Layout.of(presses, pairs, largest, 0)
+    model = JointModel(presses, waves, parameters, np.zeros((forward.k.size, 0)))
+    n = used.size
+    drift = np.zeros((n, presses.drift.shape[1]))
+    drift[:, 0] = np.where(used, found.baseline, 0.0)
     transfer = gaussian_transfer(forward.k, alone.sigma)
     state = ArrayState(
-        peak / peak[largest],
-        centres,
-        np.eye(used.sum()),
+        np.where(used, found.peak / found.peak[largest], 1.0),
+        np.nan_to_num(centres),
+        np.eye(n),
         drift,
         alone.conversion_constant * waves.mix @ transfer,
-        np.zeros((used.sum(), 0)),
-        np.zeros(leaking.shape),
+        np.zeros((n, 0)),
     )
-    nothing = np.zeros((peak.size, peak.size))
-    noise = Noise((_AT_FIRST * peak) ** 2, nothing, nothing)
-    return _Begun(model, state, noise, gaussian, forward)
+    deviation = np.where(used, _AT_FIRST * found.peak, 1.0)
+    nothing = np.zeros((n, n))
+    return _Begun(model, state, Noise(deviation**2, nothing, nothing), gaussian, forward)
 
 
 def _own_fit(fit: JointFit, *, shapes: bool) -> JointFit:
@@ -386,9 +368,8 @@ def _own_fit(fit: JointFit, *, shapes: bool) -> JointFit:
         ]
     own = np.hstack(kernels)
     model = fit.model
-    largest = int(np.flatnonzero(model.layout.gains < 0)[0])
-    pairs = model.layout.crosstalk >= 0
-    layout = Layout.of(model.presses, pairs, model.layout.leaks >= 0, largest, own.shape[1])
+    largest = int(np.flatnonzero(model.presses.used & (model.layout.gains < 0))[0])
+    layout = Layout.of(model.presses, model.layout.crosstalk >= 0, largest, own.shape[1])
     state = replace(fit.state, own=np.zeros((fit.state.gain.size, own.shape[1])))
     model = replace(model, layout=layout, own_kernels=own)
     rounds = _OWN_ROUNDS if shapes else 1
@@ -418,42 +399,40 @@ def _array(scan: Scan, prepared: Prepared, found: Sorted, fit: JointFit) -> Sens
     columns = np.column_stack([fit.posterior.root, *inputs.values()])
     numbers = array_numbers(fit, fit.posterior, columns)
     modes, of_modes = kernel_modes(fit, numbers)
-    near = fit.model.layout.crosstalk >= 0
-    everything = of_all_sensors(stacked(numbers, near, of_modes), used)
+    near = (fit.model.layout.crosstalk >= 0) & used
+    everything = stacked(numbers, near, of_modes)
     count = fit.posterior.root.shape[1]
     effects = {name: everything[:, count + i] for i, name in enumerate(inputs)}
     n = used.size
     for name, share in _scalings(prepared).items():
         # What scales all readings alike scales A.
         effects[name] = np.zeros(len(everything))
-        effects[name][:n] = -share * used
+        effects[name][:n] = -share
     state = fit.state
-    fixed = [axis for axis in (0, 1) if axis not in presses.axes]
-    centres = state.centres.copy()
-    centres[:, fixed] = np.nan
-    width = state.own[:, 0] if state.own.size else np.zeros(used.sum())
+    unknown = np.repeat(~used[:, None], 2, axis=1)
+    unknown[:, [axis for axis in (0, 1) if axis not in presses.axes]] = True
+    width = state.own[:, 0] if state.own.size else np.zeros(n)
     first = prepared.scans[0]
     rod = first.set_up.indenter
     assert isinstance(rod, Rod)
     spread = scan.layout_uncertainty
-    of_baselines = fit.posterior.root[fit.model.layout.drift[:, 0]]
+    missing = np.where(used, 0.0, np.nan)
+    of_baselines = taken(fit.posterior.root, fit.model.layout.drift[:, 0])
     return SensorArray(
         sensors=tuple(scan.sensors),
         used=used,
-        conversion_constants=_spread(np.exp(numbers.log_a), used),
-        centres=_spread(centres, used),
-        crosstalk=_spread_square(state.crosstalk, used, np.eye(n)),
-        estimated=_spread_square(near, used, np.zeros((n, n), bool)),
-        gaussian_sigmas=_spread(fit.gaussian.sigma * (1 + width), used),
-        baselines=_spread(state.drift[:, 0], used),
-        baseline_uncertainties=_spread(np.linalg.norm(of_baselines, axis=1), used),
-        noise=_spread_square(fit.noise.covariance, used, np.full((n, n), np.nan)),
+        conversion_constants=np.exp(numbers.log_a) + missing,
+        centres=np.where(unknown, np.nan, state.centres),
+        crosstalk=np.where(near, state.crosstalk, np.eye(n)),
+        estimated=near,
+        gaussian_sigmas=fit.gaussian.sigma * (1 + width) + missing,
+        baselines=state.drift[:, 0] + missing,
+        baseline_uncertainties=np.linalg.norm(of_baselines, axis=1) + missing,
+        noise=fit.noise.covariance + missing + missing[:, None],
         k=fit.forward.k,
         reference=fit.reference.values,
-        kernels=numbers.kernels if len(numbers.kernels) == 1 else _spread(numbers.kernels, used),
-        modes=replace(
-            modes, owner=np.where(modes.owner < 0, -1, np.flatnonzero(used)[modes.owner])
-        ),
+        kernels=numbers.kernels,
+        modes=modes,
         root=everything[:, :count],
         effects=effects,
         film=first.set_up.film,
@@ -463,9 +442,9 @@ def _array(scan: Scan, prepared: Prepared, found: Sorted, fit: JointFit) -> Sens
             presses.places[0],
             presses.places[1],
             presses.load,
-            _spread(np.where(presses.keep, presses.u, np.nan), used),
-            _spread(fit.model.predicted(state), used),
-            _spread(state.drift @ presses.drift.T, used),
+            np.where(presses.keep, presses.u, np.nan),
+            fit.model.predicted(state) + missing[:, None],
+            state.drift @ presses.drift.T + missing[:, None],
         ),
         kernel="own" if state.own.size else "common",
         line_y=first.line_offset,
@@ -485,15 +464,3 @@ def _scalings(prepared: Prepared) -> dict[str, float]:
     shares["load"] = (scan.load_uncertainty or 0.0) / scan.stated_load
     shares["reference_convergence"] = prepared.stresses[0].convergence or 0.0
     return {name: share for name, share in shares.items() if share}
-
-
-def _spread(values: FloatArray, used: BoolArray) -> FloatArray:
-    """Return rows of the used sensors among those of all, NaN of the others."""
-    spread = np.full((used.size, *values.shape[1:]), np.nan)
-    spread[used] = values
-    return spread
-
-
-def _spread_square(values: Any, used: BoolArray, empty: Any) -> Any:
-    empty[np.ix_(used, used)] = values
-    return empty

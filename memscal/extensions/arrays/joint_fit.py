@@ -116,22 +116,21 @@ class JointFit:
 def prior_precision(layout: Layout, spread: float) -> FloatArray:
     """Return the prior precision of all parameters, (p, p); zero of what has a flat prior."""
     precision = np.zeros((layout.count, layout.count))
-    places = layout.crosstalking
+    places = layout.crosstalk[layout.crosstalk >= 0]
     # Of t^2 1 + m^2 1 1', by Sherman and Morrison.
     alike = WIDEST**2 / (spread**2 + places.size * WIDEST**2)
     precision[np.ix_(places, places)] = (np.eye(places.size) - alike) / spread**2
-    if layout.own.size:
-        shapes = np.full(layout.own.shape[1] - 1, _OWN_SHAPE**-2)
-        precision[layout.own, layout.own] = np.append(OWN_WIDTH**-2, shapes)
+    for i, places in enumerate(layout.own.T):
+        own = places[places >= 0]
+        precision[own, own] = (_OWN_SHAPE if i else OWN_WIDTH) ** -2
     return precision
 
 
 def parameters_of(layout: Layout, state: ArrayState) -> FloatArray:
     """Return the parameters that have a prior, (p,); zero of all others."""
     values = np.zeros(layout.count)
-    for places, numbers in ((layout.crosstalk, state.crosstalk), (layout.leaks, state.leaks)):
+    for places, numbers in ((layout.crosstalk, state.crosstalk), (layout.own, state.own)):
         values[places[places >= 0]] = numbers[places >= 0]
-    values[layout.own] = state.own
     return values
 
 
@@ -172,14 +171,14 @@ def noise_of(model: JointModel, state: ArrayState) -> Noise:
     presses = model.presses
     residual = np.where(presses.keep, presses.u - model.predicted(state), 0.0)
     errors = model.press_errors(state)
-    count = presses.keep.sum(axis=1)
+    count = np.maximum(presses.keep.sum(axis=1), 1)
     both = np.maximum(presses.keep.astype(float) @ presses.keep.T, 1)
     of_presses = np.sum(errors @ errors.mT, axis=0) / both
-    freedom = np.maximum(1 - model.layout.count / len(count) / count, 0.1)
+    freedom = np.maximum(1 - model.layout.count / presses.used.sum() / count, 0.1)
     square = residual @ residual.T / both / np.sqrt(np.outer(freedom, freedom)) - of_presses
     common = np.zeros_like(square)
     for i in np.unique(presses.board):
-        members = np.flatnonzero(presses.board == i)
+        members = np.flatnonzero(presses.used & (presses.board == i))
         if members.size > 1:
             block = square[np.ix_(members, members)]
             shared = np.mean(block[np.triu_indices(members.size, 1)])
@@ -190,6 +189,7 @@ def noise_of(model: JointModel, state: ArrayState) -> Noise:
         total = np.maximum(total, stated)
     largest = np.ptp(presses.u, axis=1)
     least = np.maximum(_LEAST_OWN * total, (_ROUNDING * largest) ** 2)
+    least[~presses.used] = 1.0
     return Noise(np.maximum(total - np.diag(common), least), common, of_presses)
 
 
@@ -236,7 +236,7 @@ def fit_shape(
 
 
 def _spreads(layout: Layout) -> Sequence[float]:
-    return SPREADS if layout.crosstalking.size else SPREADS[-1:]
+    return SPREADS if layout.crosstalk.max() >= 0 else SPREADS[-1:]
 
 
 def _gaussian(gaussian: GaussianFit) -> FloatArray:

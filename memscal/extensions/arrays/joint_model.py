@@ -33,7 +33,6 @@ class ArrayState:
     drift: FloatArray  # (m, d), in V
     kernel: FloatArray  # (f,): of all, by its combination of the waves, in V/Pa
     own: FloatArray  # (m, o): sizes of each sensor's own changes of it
-    leaks: FloatArray  # (m, s): what each reads of s dead sensors, of the largest one's gain
 
 
 @array_record
@@ -52,61 +51,57 @@ class Noise:
 
 @array_record
 class Layout:
-    """Places of the parameters: ln g of all but the largest, centres, c, drifts, own changes."""
+    """Places of the parameters: ln g of all but the largest, centres, c, drifts, own changes.
 
-    gains: IndexArray  # (m,): -1 of the largest
+    Those of sensors that are not used are -1.
+    """
+
+    gains: IndexArray  # (m,): -1 of the largest, too
     centres: IndexArray  # (axes, m)
     crosstalk: IndexArray  # (m, m): -1 where not estimated
     drift: IndexArray  # (m, d)
     own: IndexArray  # (m, o)
-    leaks: IndexArray  # (m, s): -1 where not estimated
     count: int
 
     @classmethod
-    def of(
-        cls, presses: Presses, pairs: BoolArray, leaks: BoolArray, largest: int, own: int
-    ) -> Layout:
-        """Count the parameters of an array with crosstalk of pairs (m, m) and of dead ones."""
-        m = len(presses.u)
-        sizes = [m - 1, len(presses.axes) * m, int(pairs.sum()), m * presses.drift.shape[1]]
-        ends = np.cumsum([*sizes, m * own, int(leaks.sum())])
-        parts = np.split(np.arange(ends[-1]), ends[:-1])
-        gains = np.insert(parts[0], largest, -1)
-        crosstalk = np.full(pairs.shape, -1)
-        crosstalk[pairs] = parts[2]
-        leaking = np.full(leaks.shape, -1)
-        leaking[leaks] = parts[5]
-        return cls(
-            gains,
-            parts[1].reshape(-1, m),
-            crosstalk,
-            parts[3].reshape(m, -1),
-            parts[4].reshape(m, -1),
-            leaking,
-            int(ends[-1]),
-        )
-
-    @property
-    def crosstalking(self) -> IndexArray:
-        """Places of all crosstalk, that of dead sensors last, (c,)."""
-        both = np.append(self.crosstalk, self.leaks)
-        return both[both >= 0]
+    def of(cls, presses: Presses, pairs: BoolArray, largest: int, own: int) -> Layout:
+        """Count the parameters of an array with crosstalk of pairs (m, m)."""
+        used = presses.used
+        m = used.size
+        some = np.arange(m) != largest
+        free = [
+            used & some,
+            np.broadcast_to(used, (len(presses.axes), m)),
+            pairs,
+            np.broadcast_to(used[:, None], (m, presses.drift.shape[1])),
+            np.broadcast_to(used[:, None], (m, own)),
+        ]
+        places = []
+        count = 0
+        for mask in free:
+            numbers = np.full(mask.shape, -1)
+            numbers[mask] = np.arange(count, count + mask.sum())
+            count += int(mask.sum())
+            places.append(numbers)
+        return cls(*places, count)
 
     def moved(self, state: ArrayState, change: FloatArray, axes: tuple[int, ...]) -> ArrayState:
         """Return a state changed by the parameters (p,)."""
-        gain = state.gain * np.exp(np.where(self.gains < 0, 0.0, change[self.gains]))
         centres = state.centres.copy()
-        centres[:, axes] += change[self.centres].T
-        crosstalk = state.crosstalk + np.where(self.crosstalk < 0, 0.0, change[self.crosstalk])
+        centres[:, axes] += taken(change, self.centres).T
         return replace(
             state,
-            gain=gain,
+            gain=state.gain * np.exp(taken(change, self.gains)),
             centres=centres,
-            crosstalk=crosstalk,
-            drift=state.drift + change[self.drift],
-            own=state.own + change[self.own],
-            leaks=state.leaks + np.where(self.leaks < 0, 0.0, change[self.leaks]),
+            crosstalk=state.crosstalk + taken(change, self.crosstalk),
+            drift=state.drift + taken(change, self.drift),
+            own=state.own + taken(change, self.own),
         )
+
+
+def taken(rows: FloatArray, numbers: IndexArray) -> FloatArray:
+    """Return rows (p, ...) of an array by their numbers, and zero for those of -1."""
+    return np.concatenate([rows, np.zeros_like(rows[:1])])[numbers]
 
 
 @array_record
@@ -135,7 +130,6 @@ class JointModel:
     presses: Presses
     waves: Waves
     layout: Layout
-    dead: FloatArray  # (s, 2): places of dead sensors
     own_kernels: FloatArray  # (nodes, o): transforms of changes of a sensor's own kernel, in V/Pa
 
     @property
@@ -168,15 +162,7 @@ class JointModel:
     def predicted(self, state: ArrayState) -> FloatArray:
         """All readings, (m, t), in V."""
         signals, _ = self.signals(state)
-        leaking = state.leaks @ self._leaking(state.kernel[:, None])[:, :, 0]
-        return state.crosstalk @ signals + leaking + state.drift @ self.presses.drift.T
-
-    def _leaking(self, kernels: FloatArray) -> FloatArray:
-        """What dead sensors of the largest one's gain would read, by kernels (f, q): (s, t, q)."""
-        offset = self.presses.places - self.dead[:, :, None]
-        profiles = self.waves.profiles(kernels)
-        volts: FloatArray = profiles(np.hypot(offset[:, 0], offset[:, 1]))
-        return self.presses.load[:, None] * volts
+        return state.crosstalk @ signals + state.drift @ self.presses.drift.T
 
     def information(
         self, state: ArrayState, noise: Noise, kernels: FloatArray, data: FloatArray
@@ -196,8 +182,8 @@ class JointModel:
         gram = np.zeros((1 + p + q, 1 + p + q))
         shared = np.zeros((len(common), presses.load.size, 1 + p + q))
         kernel_places = np.arange(1 + p, 1 + p + q)
-        leaking = self._leaking(np.column_stack([state.kernel, kernels]))
-        for i, row in enumerate(state.crosstalk):
+        for i in np.flatnonzero(presses.used):
+            row = state.crosstalk[i]
             near = np.flatnonzero((row != 0) | (layout.crosstalk[i] >= 0))
             names = [np.zeros(1, np.intp), 1 + layout.drift[i]]
             columns = [data[i][:, None], presses.drift]
@@ -215,11 +201,6 @@ class JointModel:
                 known = np.array(places) >= 0
                 columns.append(np.stack(parts, axis=1)[:, known])
                 names.append(1 + np.array(places)[known])
-            for place, volts, leak in zip(layout.leaks[i], leaking, state.leaks[i], strict=True):
-                of_all += leak * volts[:, 1:]
-                if place >= 0:
-                    columns.append(volts[:, :1])
-                    names.append(np.array([1 + place]))
             columns.append(of_all)
             names.append(kernel_places)
             weight = presses.keep[i] / noise.own[i]

@@ -19,7 +19,7 @@ _SEEN = 1e-6
 
 @array_record
 class Presses:
-    """What m sensors read in t presses of one rod."""
+    """What m sensors read in t presses of one rod; those that are not used read nothing."""
 
     places: FloatArray  # (2, t): of the rod, in m
     load: FloatArray  # (t,): in N
@@ -31,6 +31,11 @@ class Presses:
     load_errors: FloatArray  # (t,): of each load, over it
     board: IndexArray  # (m,): whose electronics a sensor shares
     stated: FloatArray | None = None  # (m, t): stated noise, in V
+
+    @property
+    def used(self) -> BoolArray:
+        """Which sensors have readings, (m,)."""
+        return self.keep.any(axis=1)
 
 
 @array_record

@@ -11,15 +11,16 @@ from memscal.extensions.arrays.joint_model import ArrayState, JointModel, Layout
 from memscal.extensions.arrays.presses import Presses, Waves
 
 RNG = np.random.default_rng(0)
-M = 3
+M = 4
 
 
 def model(axes):
-    """Three sensors, presses anywhere, a reading missing, errors of place and load."""
+    """Three sensors and a dead one, a reading missing, errors of place and load."""
     t = 40
     places = 3e-3 * RNG.uniform(-1, 1, (2, t))
     keep = np.ones((M, t), bool)
     keep[1, 5] = False
+    keep[3] = False
     presses = Presses(
         places=places,
         load=RNG.uniform(0.9, 1.1, t),
@@ -29,34 +30,33 @@ def model(axes):
         axes=axes,
         place_errors=np.full(t, 10e-6),
         load_errors=np.full(t, 0.01),
-        board=np.array([0, 0, 1]),
+        board=np.array([0, 0, 1, 1]),
     )
     wavenumbers = Wavenumbers.covering(1e4, 20e-3)
     k = wavenumbers.k
     reference = RadialSpectrum(wavenumbers, np.exp(-1e-3 * k))
-    pairs = np.array([[0, 1, 0], [1, 0, 1], [0, 0, 0]], bool)
-    leaks = np.array([[1], [0], [1]], bool)
+    pairs = np.array([[0, 1, 0, 1], [1, 0, 1, 0], [0, 0, 0, 1], [0, 0, 0, 0]], bool)
     own = np.stack([-1e-7 * (k * 5e-4) ** 2 * gaussian_transfer(k, 5e-4)], axis=1)
-    layout = Layout.of(presses, pairs, leaks, 1, 1)
+    layout = Layout.of(presses, pairs, 1, 1)
     waves = Waves.of(reference, 10e-3)
     state = ArrayState(
-        gain=np.array([0.9, 1.0, 1.1]),
+        gain=np.array([0.9, 1.0, 1.1, 1.0]),
         centres=1e-3 * RNG.normal(size=(M, 2)),
         crosstalk=np.eye(M) + 0.02 * pairs,
-        drift=1e-4 * RNG.normal(size=(M, 2)),
+        drift=1e-4 * RNG.normal(size=(M, 2)) * [[1], [1], [1], [0]],
         kernel=1e-7 * waves.mix @ gaussian_transfer(k, 5e-4),
-        own=np.array([[0.0], [0.02], [-0.03]]),
-        leaks=0.01 * leaks,
+        own=np.array([[0.0], [0.02], [-0.03], [0.0]]),
     )
-    return JointModel(presses, waves, layout, np.array([[2e-3, 1e-3]]), own), state, k
+    return JointModel(presses, waves, layout, own), state, k
 
 
 @pytest.mark.parametrize("axes", [(0,), (0, 1)], ids=["line", "plane"])
 def test_information_is_that_of_brute_force(axes):
     joint, state, k = model(axes)
     presses = joint.presses
-    shared = 1e-8 * np.array([[1, 1, 0], [1, 1, 0], [0, 0, 0]])
-    noise = Noise(np.array([1e-8, 2e-8, 3e-8]), shared, np.zeros((M, M)))
+    shared = np.zeros((M, M))
+    shared[:2, :2] = 1e-8
+    noise = Noise(np.array([1e-8, 2e-8, 3e-8, 1.0]), shared, np.zeros((M, M)))
     kernels = joint.waves.mix @ np.stack(
         [gaussian_transfer(k, 6e-4), gaussian_transfer(k, 9e-4)], 1
     )
@@ -72,11 +72,9 @@ def test_information_is_that_of_brute_force(axes):
         added = replace(state, kernel=state.kernel + column)
         columns.append(joint.predicted(added) - joint.predicted(state))
     stacked = np.stack(columns, axis=2)
-    # Dead sensors are read by so little that errors of a press are not those of what they leak.
-    still = replace(state, leaks=np.zeros_like(state.leaks))
-    moved = replace(still, centres=state.centres - [1e-8, 0])
-    by_place = (joint.predicted(moved) - joint.predicted(still)) / 1e-8
-    signal = joint.predicted(still) - state.drift @ presses.drift.T
+    moved = replace(state, centres=state.centres - [1e-8, 0])
+    by_place = (joint.predicted(moved) - joint.predicted(state)) / 1e-8
+    signal = joint.predicted(state) - state.drift @ presses.drift.T
     gram = np.zeros_like(found.gram)
     for t in range(presses.load.size):
         covariance = noise.covariance + np.outer(by_place[:, t], by_place[:, t]) * 10e-6**2
