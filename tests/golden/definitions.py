@@ -185,7 +185,7 @@ def _group(made: dict[str | None, ET.Element], path: str, of: Record, *, needed:
         _quantity(group, quantity, optional=some or not quantity.required)
     if of.nx_class in ("NXsample", "NXsensor", "NXpositioner"):
         _field(group, "depends_on", "NX_CHAR")
-    if of in (records.KERNEL_CHANGES, records.SHARED_EFFECTS, RECORDS["roots"]):
+    if of in (records.KERNEL_CHANGES, records.SHARED_EFFECTS):
         _field(group, "names", "NX_CHAR")
     if of is _NOTE:
         _field(group, "data", "NX_CHAR")

@@ -51,7 +51,7 @@ from memscal.model.checks import QualityCheck, failed_check_messages
 from memscal.model.film import LINEAR, FilmLaw
 from memscal.model.indenter import Rod
 from memscal.model.provenance import Process
-from memscal.model.result import Correlated, Gridded, Shown
+from memscal.model.result import Gridded, Shown
 from memscal.model.scan import Scan
 from memscal.parallel import single_threaded
 
@@ -71,7 +71,7 @@ _HIGH = 0.4
 
 
 @array_record
-class ArrayCalibration(Shown, Correlated, Gridded):
+class ArrayCalibration(Shown, Gridded):
     """A finished calibration of an array.
 
     Parameters

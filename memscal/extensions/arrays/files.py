@@ -20,7 +20,6 @@ from memscal.formats.hdf5.writer import ARRAY_SCHEMA, Group, Nodes, file_tree, t
 from memscal.formats.units import reading_of
 from memscal.model import records
 from memscal.model.arrays import Values
-from memscal.model.indenter import Rod
 from memscal.model.quantities import Quantity, Record, record
 
 _U_ZZ = "/entry/reconvolution/u_zz"
@@ -35,7 +34,7 @@ _TABLES = tomllib.loads(Path(__file__).with_name("files.toml").read_text(encodin
 RECORDS = {name: _declared(**table) for name, table in _TABLES.items()}
 """Records of the groups of the file, by their names."""
 
-_PARTS = [quantity.name for quantity in RECORDS["roots"].quantities]
+_PARTS = ("of_ln_a", "of_x", "of_y", "of_c", "of_mode")
 
 
 def write_array(data: ArrayData, path: FilePath, *, overwrite: bool = False) -> None:
@@ -50,8 +49,6 @@ def write_array(data: ArrayData, path: FilePath, *, overwrite: bool = False) -> 
         "indenter": groups.indenter_group(data.indenter, data),
         "process": write_record(records.PROCESS, data.process),
     }
-    names = to_json(list(data.effects))
-    children["roots"] = write_record(RECORDS["roots"], stated, names=names)
     entry = Group("NXentry", children, {"default": "sensors"})
     write_tree(file_tree(ARRAY_SCHEMA, entry), path, overwrite=overwrite)
 
@@ -67,6 +64,7 @@ def stated_in_file(data: ArrayData) -> Values:
         **vars(data.readings),
         **dict(zip(_PARTS, data.split(data.columns), strict=True)),
         "names": to_json(data.sensors),
+        "inputs": to_json(list(data.effects)),
         "reference_unit": data.reading.per,
         "conversion_constants_errors": np.sqrt(np.diag(data.covariance)),
         "gaussian_sigmas_errors": np.linalg.norm(data.sigma_columns, axis=1),
@@ -118,21 +116,18 @@ def array_from(file: SafeFile) -> ArrayData:
         "process": groups.read_process(file),
     }
     data = ArrayData(**{n: read[n] for n in read.keys() & ArrayData.__dataclass_fields__.keys()})
-    parameters = 3 * len(names) + len(data.pairs) + len(data.modes.owner)
-    if len(columns) != parameters or not isinstance(data.indenter, Rod):
+    if len(columns) != 3 * len(names) + len(data.pairs) + len(data.modes.owner):
         raise FormatError(
             f"{file.name} does not fit together: its roots have {len(columns)} rows.",
-            why=f"Its array, calibrated with a rod, has {parameters} parameters.",
             cure="Calibrate the array again.",
         )
     return data
 
 
-_PATHS = {f"/entry/{name}": of for name, of in RECORDS.items()}
 KIND = (
     array_from,
     {
-        **_PATHS,
+        **{f"/entry/{name}": of for name, of in RECORDS.items()},
         "/entry/indenter": records.INDENTER,
         "/entry/sample/film": records.FILM,
         "/entry/process": records.PROCESS,

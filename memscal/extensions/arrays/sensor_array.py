@@ -17,11 +17,11 @@ from memscal.formats.hdf5.reader import open_hdf5
 from memscal.formats.hdf5.writer import ARTIFACT_SCHEMA, SCHEMA_ATTRIBUTE
 from memscal.model.arrays import FloatArray, keyword_array_record
 from memscal.model.provenance import SourceFile
-from memscal.model.result import Correlated, Gridded, Shown
+from memscal.model.result import Gridded, Shown
 
 
 @keyword_array_record
-class SensorArray(ArrayData, Shown, Correlated, Gridded):
+class SensorArray(ArrayData, Shown, Gridded):
     """Sensors under one film, calibrated together, as :func:`memscal.calibrate_array` finds them.
 
     Parameters

@@ -1,4 +1,4 @@
-"""A calibrated array as an answer, tables, a mapping, arrays and correlated numbers."""
+"""A calibrated array as an answer, tables, a mapping and arrays."""
 
 from collections.abc import Sequence
 from types import SimpleNamespace
@@ -10,13 +10,11 @@ from memscal.extensions.arrays.files import RECORDS, stated_in_file
 from memscal.extensions.arrays.sensor_array import SensorArray
 from memscal.model.arrays import Values
 from memscal.model.notation import format_measured
-from memscal.summaries.declared import Dataset, correlated_numbers, members, record_arrays
+from memscal.summaries.declared import Dataset, members, record_arrays
 from memscal.summaries.table import Table, checks_json, checks_table, percent, texts_of, verdict
 
 #: Names of sensors that a sentence lists.
 _NAMED = 3
-#: Sources below this share of A are not listed.
-_NEGLIGIBLE = 1e-6
 _SHOWN = ("conversion", "centre", "gaussian", "crosstalk")
 
 
@@ -86,7 +84,7 @@ def _crosstalk_text(array: SensorArray) -> str:
 
 
 def tables(result: Any) -> list[Table]:
-    """Return the sensors, their crosstalk if it is identified, sources of u(A), and the checks."""
+    """Return the sensors, their crosstalk if it is identified, and the checks."""
     array = array_of(result)
     numbers = _numbers(array)
     crosstalk = numbers.pop("crosstalk")
@@ -97,23 +95,14 @@ def tables(result: Any) -> list[Table]:
         if not np.isnan(pairs).all():
             heads.append(f"{name.replace('_', ' ')} ({held['unit']})")
             columns.append([format_measured(value, error) for value, error in pairs])
-    n = len(array.sensors)
-    spreads = {"noise": np.linalg.norm(array.root[:n], axis=1), **array.effects}
-    shares = {source: np.median(abs(u[:n][array.used])) for source, u in spreads.items()}
-    sources = [
-        (source.replace("_", " "), percent(share))
-        for source, share in shares.items()
-        if share > _NEGLIGIBLE
-    ]
     return [
         Table(
-            f"Array of {n} sensors (± standard uncertainty, k = 1)",
+            f"Array of {len(array.sensors)} sensors (± standard uncertainty, k = 1)",
             ("sensor", *heads),
             list(zip(array.sensors, *columns, strict=True)),
             frozenset(np.flatnonzero(~array.used).tolist()),
         ),
         _crosstalk_table(array, crosstalk),
-        Table("Uncertainty of A by source (median)", ("source", "u(A)/A"), sources),
         checks_table(array.checks),
     ]
 
@@ -160,12 +149,3 @@ def dataset(result: Any) -> Dataset:
         held = record_arrays(of.read_in(array.reading), stated)
         variables |= {name: variable for name, variable in held.items() if variable[0]}
     return xarray.Dataset(variables, {"sensor": list(array.sensors)})
-
-
-def correlated(result: Any) -> Values:
-    """Return the conversion constants of the used sensors, with their covariance."""
-    array = array_of(result)
-    used = np.flatnonzero(array.used)
-    names = [array.sensors[i] for i in used]
-    covariance = array.covariance[np.ix_(used, used)]
-    return correlated_numbers(names, array.conversion_constants[used], covariance)
