@@ -7,15 +7,15 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from memscal.extensions.arrays.array_checks import IDENTIFIED
+from memscal.extensions.arrays.bound_figure import bound_map
 from memscal.extensions.arrays.sensor_array import SensorArray
-from memscal.extensions.arrays.summary import answer, array_of, identified
+from memscal.extensions.arrays.summary import array_of, identified
 from memscal.figures.report import Picture, Report
 from memscal.figures.style import (
     DECONVOLVED,
     FAILED,
     GAUSSIAN,
     MEASURED,
-    MUTED,
     drawable,
     panels_of,
 )
@@ -29,15 +29,15 @@ _LONGER = 20.0
 _MOST_NUMBERS = 16
 #: Residuals are drawn up to so many standard deviations.
 _FARTHEST = 4.0
-#: Readings up to so many thicknesses from the sensor are drawn, in this share of its cell.
+#: Readings up to so many thicknesses from the sensor are drawn.
 _NEAR = 3.0
-_FILLED = 0.85
 _CAPTION = (
     "a: A at the centres of the sensors; lines: deviations from the layout, 20 times as long; "
     "crosses: sensors that are not used. b: what the sensor of a row reads of that of a column; "
     "grey: not estimated, or not identified. c: residuals in standard deviations of a reading; a "
     "stripe along a row is a sensor, one down a column a press. d: readings of each sensor by the "
-    "distance from it, and what the array predicts. e: correlation of the noise."
+    "distance from it, and what the array predicts. e, f: least uncertainties of place and force "
+    "of a contact at the load of the scan, by the noise. g: correlation of the noise."
 )
 
 
@@ -48,14 +48,16 @@ def array_figure(result: Any) -> Figure:
     readings = array.readings
     residuals = (readings.u - readings.predicted) / deviation[:, None]
     correlation = array.noise / np.outer(deviation, deviation)
-    with panels_of(9.0, 3, 2, note="") as (figure, panels):
-        _draw_places(panels[0, 0], array)
-        _draw_crosstalk(panels[0, 1], array)
-        _draw_matrix(panels[1, 0], array, residuals, "residual over noise", _FARTHEST)
-        panels[1, 0].set(aspect="auto", xlabel="press")
-        _draw_readings(panels[1, 1], array)
-        _draw_matrix(panels[2, 0], array, correlation, "correlation of the noise", 1.0)
-        panels[2, 1].set_axis_off()
+    with panels_of(11.0, 4, 2, note="") as (figure, panels):
+        places, crosstalk, scan, profiles, of_place, of_force, noise, rest = panels.flat
+        _draw_places(places, array)
+        _draw_crosstalk(crosstalk, array)
+        _draw_matrix(scan, array, residuals, "residual over noise", _FARTHEST)
+        scan.set(aspect="auto", xlabel="press")
+        _draw_readings(profiles, array)
+        bound_map(array, of_place, of_force, force=array.load)
+        _draw_matrix(noise, array, correlation, "correlation of the noise", 1.0)
+        rest.remove()
     return figure
 
 
@@ -64,24 +66,17 @@ def _draw_places(axes: Axes, array: SensorArray) -> None:
     shown = Quantity("a", "voltage per stress").read_in(array.reading)
     a = array.conversion_constants / shown.scale
     x, y = array.places.T / MM
-    points = axes.scatter(x, y, c=a, s=30, zorder=2)
+    points = axes.scatter(x, y, c=a, s=30)
     axes.figure.colorbar(points, ax=axes, label=f"A ({shown.unit})")
     if array.layout is not None:
         away = array.places - array.layout
-        ends = array.places + _LONGER * (away - np.nanmean(away, axis=0))
-        axes.plot([x, ends[:, 0] / MM], [y, ends[:, 1] / MM], color=GAUSSIAN, zorder=3)
+        end = array.places + _LONGER * (away - np.nanmean(away, axis=0))
+        axes.plot([x, end[:, 0] / MM], [y, end[:, 1] / MM], color=GAUSSIAN)
         axes.plot(*array.layout[~array.used].T / MM, "x", color=FAILED)
-    if a.size <= _MOST_NUMBERS:
-        power = 10.0 ** np.floor(np.log10(np.nanmedian(a)))
-        for i in np.flatnonzero(array.used):
-            axes.annotate(
-                f"{a[i] / power:.2f}",
-                (x[i], y[i]),
-                (0, 6),
-                textcoords="offset points",
-                ha="center",
-                fontsize=6,
-            )
+    power = 10.0 ** np.floor(np.log10(np.nanmedian(a)))
+    for i in np.flatnonzero(array.used) if a.size <= _MOST_NUMBERS else ():
+        number = f"{a[i] / power:.2f}"
+        axes.annotate(number, (x[i], y[i]), (-8, 5), textcoords="offset points", fontsize=6)
     axes.set_aspect("equal", adjustable="datalim")
     axes.set(xlabel="x (mm)", ylabel="y (mm)")
 
@@ -92,12 +87,11 @@ def _draw_crosstalk(axes: Axes, array: SensorArray) -> None:
     known = array.estimated & (errors <= IDENTIFIED) & identified(array)
     crosstalk = 100 * np.where(known, array.crosstalk, np.nan)
     largest = 200 * np.max(abs(array.crosstalk), where=known, initial=IDENTIFIED)
-    u = f", u up to {percent(errors[known].max())}" if known.any() else ": not identified"
-    _draw_matrix(axes, array, crosstalk, f"crosstalk (%){u}", largest)
-    if len(known) <= _MOST_NUMBERS:
-        for i, j in np.argwhere(known):
-            text = f"{crosstalk[i, j]:.2f}\n±{100 * errors[i, j]:.2f}"
-            axes.annotate(text, (j, i), ha="center", va="center", fontsize=5)
+    u = f"u up to {percent(errors[known].max())}" if known.any() else "not identified"
+    _draw_matrix(axes, array, crosstalk, f"crosstalk (%), {u}", largest)
+    for i, j in np.argwhere(known) if len(known) <= _MOST_NUMBERS else ():
+        text = f"{crosstalk[i, j]:.2f}\n±{100 * errors[i, j]:.2f}"
+        axes.annotate(text, (j, i), ha="center", va="center", fontsize=5)
 
 
 def _draw_matrix(
@@ -116,33 +110,31 @@ def _draw_readings(axes: Axes, array: SensorArray) -> None:
     readings = array.readings
     reach = _NEAR * array.film.thickness
     columns = int(np.ceil(np.sqrt(array.used.size)))
-    for i, name in enumerate(array.sensors):
+    for i in np.flatnonzero(array.used):
         row, column = divmod(i, columns)
-        if columns**2 <= _MOST_NUMBERS:
-            axes.annotate(drawable(name), (column, -row + _FILLED), fontsize=5, color=MUTED)
         x, y = readings.x - array.places[i, 0], readings.y - array.places[i, 1]
         distance = x if array.on_a_line else np.hypot(x, y)
         near = np.argsort(distance)
         near = near[abs(distance[near]) < reach]
-        place = column + _FILLED * (distance[near] / reach + array.on_a_line) / 2
+        place = column + distance[near] / reach * (0.4 if array.on_a_line else 0.8)
         both = np.stack([readings.u[i], readings.predicted[i]]) - readings.background[i]
-        measured, predicted = _FILLED * both[:, near] / both[1, near].max(initial=0.0) - row
+        measured, predicted = 0.8 * both[:, near] / both[1].max() - row
         axes.plot(place, measured, ".", ms=1.5, color=MEASURED, rasterized=True)
         axes.plot(place, predicted, color=DECONVOLVED, lw=0.6)
+        if columns**2 <= _MOST_NUMBERS:
+            axes.annotate(drawable(array.sensors[i]), (place[0], 0.7 - row), fontsize=6)
     axes.set_axis_off()
 
 
 def report(result: Any) -> Report:
     """Return what the page of an array says beside its tables."""
     array = array_of(result)
-    found = answer(array)
+    process = array.process
     return Report(
         title=f"Array of {len(array.sensors)} sensors",
-        verdict=found,
-        leading=3,
-        pictures=[Picture(result.plot, f"{_CAPTION} {found}", _CAPTION)],
+        pictures=[Picture(result.plot, _CAPTION, _CAPTION)],
         checks=array.checks,
-        messages=array.process.messages,
-        files={"scan": array.process.input_scan},
-        process=array.process,
+        messages=process.messages,
+        files={"scan": process.input_scan},
+        process=process,
     )

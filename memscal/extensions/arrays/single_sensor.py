@@ -55,7 +55,8 @@ def single_sensor(array: ArrayData, name: str) -> ApparatusFunction:
     errors = np.linalg.norm(of_transfer, axis=1)
     gaussian = gaussian_transfer(array.k, sigma)
     lost = RESOLVED * errors > gaussian
-    x = np.unique(array.readings.x)
+    readings = array.readings
+    x = np.unique(readings.x if np.ptp(readings.x) else readings.y)
     sampled = np.pi * (x.size - 1) / np.ptp(x)
     resolved = float(min(array.k[np.argmax(lost) if lost.any() else -1], sampled))
     k = round_wavenumbers(resolved)

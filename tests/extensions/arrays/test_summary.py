@@ -77,7 +77,7 @@ def test_figure_and_page_show_the_array(tmp_path, size):
     array = full_array(*size, **identified(passed=size[0] == 1))
     figure = array.plot()
     labels = [axes.get_label() for axes in figure.axes]
-    assert labels[:6] == list("abcdef")
+    assert labels[:7] == list("abcdefg")
     crosstalk = figure.axes[1].images[0].get_array()
     # All grey where it is not identified; only pairs that were estimated elsewhere.
     shown = np.isfinite(np.ma.filled(crosstalk, np.nan))
