@@ -277,7 +277,7 @@ def _press_errors(fit: JointFit) -> Failing:
         check(
             "press_errors",
             ratios.max(),
-            chdtri(count, FALSE_ALARM / 2) / count,
+            float(chdtri(count, FALSE_ALARM / 2)) / count,
             "What an error of place, or of load, common to all sensors explains of the residuals "
             "of a press, over what noise has it explain. A failure means that place or load "
             "scatters by more than is stated (x_errors, normal_load_errors).",

@@ -83,7 +83,8 @@ class Layout:
             numbers[mask] = np.arange(count, count + mask.sum())
             count += int(mask.sum())
             places.append(numbers)
-        return cls(*places, count)
+        gains, centres, crosstalk, drift, changes = places
+        return cls(gains, centres, crosstalk, drift, changes, count)
 
     def moved(self, state: ArrayState, change: FloatArray, axes: tuple[int, ...]) -> ArrayState:
         """Return a state changed by the parameters (p,)."""

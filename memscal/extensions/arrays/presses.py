@@ -35,7 +35,7 @@ class Presses:
     @property
     def used(self) -> BoolArray:
         """Which sensors have readings, (m,)."""
-        return self.keep.any(axis=1)
+        return np.asarray(self.keep.any(axis=1))
 
 
 @array_record
