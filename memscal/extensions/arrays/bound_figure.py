@@ -8,50 +8,35 @@ from memscal.extensions.arrays.array_data import ArrayData
 from memscal.extensions.arrays.bound import bound
 from memscal.extensions.arrays.locate import Seeking
 from memscal.figures.style import DECONVOLVED, MUTED
-from memscal.model.arrays import FloatArray
 from memscal.model.quantities import MM
 
-#: Places along each axis of a map, and along a row; how far beyond the sensors they go, in
-#: thicknesses.
-_FINE = 41
-_ALONG = 241
+#: How far the map goes beyond the sensors, and its step, in thicknesses.
 _BEYOND = 1.0
+_STEP = 0.1
 
 
 def bound_map(
     array: ArrayData, of_place: Axes, of_force: Axes, *, force: float = 1.0, shear: float = 0.3
 ) -> None:
     """Draw u(x), in mm, and u(force), in percent, of a force (N) at a point; of a row as curves."""
-    centres = array.places[array.used]
-    low = centres.min(axis=0) - _BEYOND * array.film.thickness
-    high = centres.max(axis=0) + _BEYOND * array.film.thickness
-    axes = Seeking.on(array, "point", shear).axes
-    count = _FINE if len(axes) > 1 else _ALONG
-    middle = centres.mean(axis=0)
-    x, y = (
-        np.linspace(low[i], high[i], count) if i in axes else middle[i : i + 1] for i in range(2)
-    )
-    places = np.stack(np.meshgrid(x, y), axis=-1)
-    covariance = bound(array, places.reshape(-1, 2), force, shear=shear)
-    errors = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2)).reshape(*places.shape[:2], 3)
-    name = "xy"[axes[0]]
-    drawn = (
-        (of_place, errors[..., axes[0]] / MM, f"least $u({name})$ (mm)"),
-        (of_force, 100 * errors[..., 2] / force, "least $u$(force) (%)"),
-    )
-    for panel, values, text in drawn:
-        if len(axes) < 2:
-            panel.plot((x, y)[axes[0]] / MM, values.ravel(), color=DECONVOLVED)
-            for centre in centres[:, axes[0]] / MM:
-                panel.axvline(centre, color=MUTED, lw=0.5, ls=":")
-            panel.set(yscale="log", xlabel=f"${name}$ (mm)", ylabel=text)
+    seeking = Seeking.on(array, "point", shear, _BEYOND)
+    axis = seeking.axes[0]
+    name = "xy"[axis]
+    places = seeking.grid(_STEP)
+    covariance = bound(array, places, force, shear=shear)
+    x, y = places.T / MM
+    for panel, i, scale, label in (
+        (of_place, axis, MM, f"least $u({name})$ (mm)"),
+        (of_force, 2, force / 100, "least $u$(force) (%)"),
+    ):
+        errors = np.sqrt(covariance[:, i, i]) / scale
+        centres = seeking.fields.centres / MM
+        if len(seeking.axes) > 1:
+            drawn = panel.tripcolor(x, y, errors, norm=LogNorm(), shading="gouraud")
+            panel.figure.colorbar(drawn, ax=panel, label=label)
+            panel.plot(*centres.T, "s", mfc="none", color="white", ms=4)
+            panel.set(aspect="equal", xlabel="$x$ (mm)", ylabel="$y$ (mm)")
         else:
-            _draw_map(panel, places / MM, values, text)
-            panel.plot(*centres.T / MM, "s", mfc="none", color="white", ms=4)
-
-
-def _draw_map(panel: Axes, places: FloatArray, values: FloatArray, label: str) -> None:
-    x, y = np.moveaxis(places, -1, 0)
-    drawn = panel.pcolormesh(x, y, values, norm=LogNorm(), shading="gouraud")
-    panel.figure.colorbar(drawn, ax=panel, label=label)
-    panel.set(aspect="equal", xlabel="$x$ (mm)", ylabel="$y$ (mm)")
+            panel.plot(places[:, axis] / MM, errors, color=DECONVOLVED)
+            panel.vlines(centres[:, axis], errors.min(), errors.max(), color=MUTED, lw=0.5, ls=":")
+            panel.set(yscale="log", xlabel=f"${name}$ (mm)", ylabel=label)

@@ -13,6 +13,7 @@ from memscal.cli.options import (
     Quantity,
     accept_altered_option,
     figure_option,
+    indenter_from,
     option,
     out_option,
     output_options,
@@ -34,10 +35,7 @@ def _indenter(ctx: click.Context, param: click.Parameter, text: str) -> Any:
         return text
     if shape not in ("rod", "sphere"):
         raise click.BadParameter(f"{text!r} is not point, rod:MM or sphere:MM.", ctx, param)
-    from memscal.model.indenter import Rod, Sphere
-
-    kind = {"rod": Rod, "sphere": Sphere}[shape]
-    return kind(radius=Quantity("mm").convert(radius, param, ctx))
+    return indenter_from(shape, {"radius": Quantity("mm").convert(radius, param, ctx)})
 
 
 @click.command("locate", epilog=EXAMPLES)
@@ -58,17 +56,7 @@ def _indenter(ctx: click.Context, param: click.Parameter, text: str) -> Any:
 @figure_option("Draw places and forces.")
 @output_options
 def command(
-    array: Path,
-    frames: Path,
-    indenter: Any,
-    shear: float,
-    rest: Path | None,
-    u_unit: str | None,
-    output: Path | None,
-    accept_altered: bool,
-    figures: tuple[Path, ...],
-    as_json: bool,
-    force: bool,
+    array: Path, frames: Path, rest: Path | None, output: Path | None, **options: Any
 ) -> None:
     """Find where contacts press on a calibrated ARRAY in each of the FRAMES, and how strongly.
 
@@ -76,23 +64,24 @@ def command(
     its unit: "T00 [mV]". A column "frame" or "t" is carried over. An empty cell is a missing
     reading. One contact is sought in each frame.
     """
-    out.prove_writable([output, *figures], force=force, inputs=[array, frames, rest])
+    figures = options["figures"]
+    out.prove_writable([output, *figures], force=options["force"], inputs=[array, frames, rest])
     from memscal.extensions.arrays.contacts_summary import csv_text
     from memscal.extensions.arrays.frames import read_frames
     from memscal.extensions.arrays.sensor_array import load_array
 
-    held = load_array(array, accept_altered=accept_altered)
-    read = read_frames(held, frames, u_unit)
-    zero = None if rest is None else read_frames(held, rest, u_unit).u
+    held = load_array(array, accept_altered=options["accept_altered"])
+    read = read_frames(held, frames, options["u_unit"])
+    zero = None if rest is None else read_frames(held, rest, options["u_unit"]).u
     with out.working("Locating"):
-        contacts = held.locate(read.u, indenter=indenter, shear=shear, rest=zero)
-    if read.number is not None:
-        contacts = replace(contacts, frame=read.number)
-    contacts = replace(contacts, time=read.time)
+        contacts = held.locate(read.u, options["indenter"], options["shear"], zero)
+    number = contacts.frame if read.number is None else read.number
+    contacts = replace(contacts, frame=number, time=read.time)
     files = out.drawn(contacts, figures)
     if output is not None:
         files[output] = csv_text(contacts).encode("utf-8")
     with together():
-        out.write_files(files, force=force)
-        out.emit_result(contacts, {"contacts": output and str(output)}, as_json=as_json)
+        out.write_files(files, force=options["force"])
+        head = {"contacts": output and str(output)}
+        out.emit_result(contacts, head, as_json=options["as_json"])
     out.say_written(files)

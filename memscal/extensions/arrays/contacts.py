@@ -6,16 +6,8 @@ import numpy as np
 
 from memscal.model.arrays import FloatArray, FrozenArrays, IndexArray, keyword_array_record
 from memscal.model.indenter import RoundIndenter
+from memscal.model.quantities import MM
 from memscal.model.result import Shown, Tabulated
-
-#: Flags of a frame, in their order: no place is given under the first three.
-NO_READING = "no reading"
-TOO_FEW = "too few readings"
-NO_CONTACT = "no contact"
-SATURATED = "saturated"
-EDGE = "edge"
-WEAK = "weak"
-MISFIT = "misfit"
 
 
 @keyword_array_record
@@ -50,7 +42,7 @@ class Contacts(FrozenArrays, Shown, Tabulated):
         Number of each frame.
     time : ndarray, shape (frames,), or None
         Time of each frame, in s.
-    centres : ndarray, shape (sensors, 2), or None
+    centres : ndarray, shape (sensors, 2)
         Places of the sensors that were used, in m.
     unit : str
         Unit of the forces: ``N``, or ``1`` of presses.
@@ -74,8 +66,8 @@ class Contacts(FrozenArrays, Shown, Tabulated):
     assumed_shear: float
     indenter: RoundIndenter | None
     frame: IndexArray | FloatArray
+    centres: FloatArray
     time: FloatArray | None = None
-    centres: FloatArray | None = None
     unit: str = "N"
 
     def __repr__(self) -> str:
@@ -86,3 +78,17 @@ class Contacts(FrozenArrays, Shown, Tabulated):
     def uncertainties(self) -> FloatArray:
         """Standard uncertainties (k = 1) of x, y and force, shape (frames, 3)."""
         return np.sqrt(np.diagonal(self.covariance, axis1=1, axis2=2))
+
+    @property
+    def pressed_by(self) -> str:
+        """The assumed indenter, as the command line has it: ``point``, ``rod:0.25`` (in mm)."""
+        one = self.indenter
+        return "point" if one is None else f"{one.shape}:{one.radius / MM:g}"
+
+    @property
+    def assumed(self) -> str:
+        """What was assumed of the contacts, in words."""
+        if self.unit != "N":
+            return "Assumed: presses like those of the scan; forces are in such presses."
+        shear = f"shear over normal force of 0 ± {self.assumed_shear:g} (k = 1) along each axis"
+        return f"Assumed: {self.pressed_by}, {shear if self.assumed_shear else 'no shear'}."

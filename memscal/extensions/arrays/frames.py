@@ -14,9 +14,7 @@ from memscal.model.arrays import FloatArray
 from memscal.model.quantities import dimension_in
 
 #: Columns that are no readings.
-_FRAME = "frame"
-_TIME = "t"
-_NAMED = 8
+_CARRIED = ("frame", "t")
 
 
 class Frames(NamedTuple):
@@ -32,35 +30,26 @@ def read_frames(array: ArrayData, path: FilePath, u_unit: str | None = None) -> 
     table = open_table(path)
     heads = {cut_head(name)[0]: name for name in table.names}
     lacking = [name for name in array.sensors if name not in heads]
-    others = [name for name in heads if name not in (*array.sensors, _FRAME, _TIME)]
+    others = [name for name in heads if name not in (*array.sensors, *_CARRIED)]
     if lacking or others:
-        counts = f"{len(heads.keys() - {_FRAME, _TIME})} columns of readings"
-        lines = [f"{path} has {counts}, but the array has {len(array.sensors)} sensors."]
-        if lacking:
-            lines.append(f"Sensors without a column: {_listed(lacking)}.")
-        if others:
-            lines.append(f"Columns of no sensor: {_listed(others)}.")
+        count = len(heads.keys() - {*_CARRIED})
         raise FormatError(
-            " ".join(lines),
+            f"{path} has {count} columns of readings, but the array has {len(array.sensors)} "
+            f"sensors. Without a column: {', '.join(lacking) or 'none'}. Columns of no sensor: "
+            f"{', '.join(others) or 'none'}.",
             why="Columns are matched by the names of the sensors.",
             cure=f"Name one column after each sensor, with its unit ('{array.sensors[0]} [mV]'), "
-            f"empty where it did not read; beside them only '{_FRAME}' or '{_TIME}'.",
+            "empty where it did not read; beside them only 'frame' or 't'.",
         )
     of_u = dimension_in("voltage", array.reading)
     wanted = {}
     for name in array.sensors:
         unit = table.unit_of(heads[name], u_unit, "u_unit (--u-unit)")
         wanted[name] = Wanted(heads[name], unit, of_u)
-    if _FRAME in heads:
-        wanted[_FRAME] = Wanted(heads[_FRAME])
-    if _TIME in heads:
-        unit = table.unit_of(heads[_TIME], None, _TIME, "s")
-        wanted[_TIME] = Wanted(heads[_TIME], unit, "time")
+    if "frame" in heads:
+        wanted["frame"] = Wanted(heads["frame"])
+    if "t" in heads:
+        wanted["t"] = Wanted(heads["t"], table.unit_of(heads["t"], None, "t", "s"), "time")
     columns = table.columns(wanted)
     u = np.column_stack([columns[name] for name in array.sensors])
-    return Frames(u, columns.get(_FRAME), columns.get(_TIME))
-
-
-def _listed(names: list[str]) -> str:
-    more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
-    return ", ".join(names[:_NAMED]) + more
+    return Frames(u, columns.get("frame"), columns.get("t"))

@@ -16,6 +16,8 @@ that a contact like it reads what was measured, whatever the law of the film.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from memscal.axisymmetry.hankel import RadialSpectrum, Wavenumbers, radial_spline
@@ -27,14 +29,13 @@ from memscal.mechanics.film_response import base_response
 from memscal.mechanics.indent import indent
 from memscal.model.arrays import (
     ArrayPair,
-    Arrays,
     ArrayTriple,
     FloatArray,
     IndexArray,
     array_record,
     floats,
 )
-from memscal.model.film import LINEAR, ElasticFilm, more_and_less
+from memscal.model.film import LINEAR, ElasticFilm
 from memscal.model.indenter import Rod, RoundIndenter
 from memscal.model.scan import SetUp
 
@@ -44,11 +45,9 @@ _LARGEST_KH = 20.0
 MARGIN = 2.0
 _STEPS = 200
 #: Loads over that of the calibration at which a sphere is pressed.
-_LOADS = tuple(np.geomspace(0.01, 20.0, 12))
+_LOADS = np.geomspace(0.01, 20.0, 12)
 #: A radius in place of zero, as a share of the tables' step.
 _AXIS = 1e-6
-#: Parameters of a contact: x, y, force, and shear over force along x and y.
-CONTACT = 5
 
 
 @array_record
@@ -63,121 +62,101 @@ class ReceptiveFields:
     sensors: IndexArray  # (n,): which are used
     centres: FloatArray  # (n, 2)
     mixing: FloatArray  # (n, n): C_ij A_j
-    step: float  # of the radii, in m
-    owner: IndexArray  # (n,): which kernel
+    radii: FloatArray  # (r,): evenly spaced, in m
     loads: FloatArray  # (q,): of the tables, in N
     contact_radii: FloatArray  # (q,): in m
-    # f, f'/R, -g/R and -(g/R)'/R per newton, (kernels, loads, radii, 4).
+    # f, f'/R, -g/R and -(g/R)'/R per newton: (loads, kernels, radii, 4).
     profiles: FloatArray
-    of_modes: FloatArray  # (radii, modes): changes of f by the kernels' modes
-    of_inputs: Arrays  # (radii,) each: changes of f by stated inputs that the contact has, too
+    # Changes of f by the kernels' modes and by inputs that the contact has, too, (changes, radii);
+    # whose sensor's each is, or ALL; and their sizes by one u of each independent error.
+    changes: FloatArray
+    owner: IndexArray
+    sizes: FloatArray  # (changes, c)
 
     @property
     def unit(self) -> str:
-        """Unit of what the fields are given per."""
+        """Unit of the forces."""
         return "N"
 
     def radius(self, force: FloatArray) -> FloatArray:
         """Contact radii (m) under forces."""
         return np.interp(force, self.loads, self.contact_radii)
 
-    def normal(self, places: FloatArray, force: FloatArray | None = None) -> ArrayTriple:
+    def normal(self, places: FloatArray, force: FloatArray | float = 1.0) -> ArrayTriple:
         """Fields per newton without shear, and their derivatives by x and y, (m, n) each."""
         offsets = places[:, None] - self.centres
-        table, _ = self._looked_up(offsets, force, 2)
+        table = self._looked_up(offsets, force, 2)
         along = offsets * table[..., 1:]
-        fields = (
-            self.mixing @ values.T for values in (table[..., 0], along[..., 0], along[..., 1])
-        )
-        h, by_x, by_y = (values.T for values in fields)
+        parts = (table[..., 0], along[..., 0], along[..., 1])
+        h, by_x, by_y = (part @ self.mixing.T for part in parts)
         return h, by_x, by_y
 
     def forward(self, places: FloatArray, force: FloatArray, shear: FloatArray) -> ArrayPair:
         """Readings (m, n), and their derivatives by x, y, force and the two shears, (m, n, 5)."""
-        value, along, towards, growth = self._sources(places, force, shear)
-        scale = force[:, None, None]
-        slopes = np.concatenate([scale * along, (value + growth)[..., None], scale * towards], -1)
-        mixed = self.mixing @ np.concatenate([value[..., None], slopes], axis=-1)
-        return force[:, None] * mixed[..., 0], mixed[..., 1:]
+        value, along, towards = self._sources(places, force, shear)
+        slopes = np.concatenate([along, value[..., None], towards], axis=-1)
+        slopes = self.mixing @ slopes
+        slopes[..., [0, 1, 3, 4]] *= force[:, None, None]
+        # How the stress per newton changes with the force is left out of its derivative.
+        return force[:, None] * slopes[..., 2], slopes
 
     def errors(self, places: FloatArray, force: FloatArray, shear: FloatArray) -> FloatArray:
         """Changes of the readings by one u of each independent error of the array, (m, n, c)."""
         array = self.array
-        value, along, *_ = self._sources(places, force, shear)
-        inputs = [*array.effects, *(self.of_inputs.keys() - array.effects.keys())]
-        unmoved = np.zeros(len(array.root))
-        by_input = [array.effects.get(name, unmoved) for name in inputs]
-        columns = np.column_stack([array.root, *by_input])
-        strengths, x, y, by_pair, by_mode = array.split(columns)
-        by_strength, by_x, by_y = (rows[self.sensors] for rows in (strengths, x, y))
-        own = value[..., None] * by_strength
-        own -= along[..., :1] * by_x + along[..., 1:] * by_y
+        value, along, _ = self._sources(places, force, shear)
+        *rows, by_pair, _ = array.split(array.columns)
+        by_strength, by_x, by_y = (part[self.sensors] for part in rows)
+        own = value[..., None] * by_strength - along[..., :1] * by_x - along[..., 1:] * by_y
         apart = np.linalg.norm(places[:, None] - self.centres, axis=-1)
-        if by_mode.size:
-            owner = array.modes.owner
-            has = np.equal(owner, ALL) | np.equal.outer(self.sensors, owner)
-            own += (has * self._interpolated(self.of_modes, apart)) @ by_mode
-        first = array.root.shape[1]
-        for i, name in enumerate(inputs, first):
-            if name in self.of_inputs:
-                own[..., i] += self._interpolated(self.of_inputs[name], apart)
-        changes: FloatArray = self.mixing @ own
-        number = np.full(len(array.sensors), -1)
-        number[self.sensors] = np.arange(self.sensors.size)
-        pairs = number[array.pairs]
-        known = (pairs >= 0).all(axis=1)
-        rows, others = pairs[known].T
+        for change, owner, size in zip(self.changes, self.owner, self.sizes, strict=True):
+            has = (owner == ALL) | (self.sensors == owner)
+            own += (has * np.interp(apart, self.radii, change))[..., None] * size
+        moved = self.mixing @ own
+        known = array.used[array.pairs].all(axis=1)
+        rows_of, others = (np.cumsum(array.used) - 1)[array.pairs[known]].T
         read = value * array.conversion_constants[self.sensors]
-        by_crosstalk = read[:, others, None] * by_pair[known]
-        # Several pairs have the same row.
-        np.add.at(changes.swapaxes(0, 1), rows, by_crosstalk.swapaxes(0, 1))
-        return np.asarray(force[:, None, None] * changes)
+        for row, other, size in zip(rows_of, others, by_pair[known], strict=True):
+            moved[:, row] += read[:, other, None] * size
+        return floats(force[:, None, None] * moved)
 
-    def _sources(self, places: FloatArray, force: FloatArray, shear: FloatArray) -> FieldParts:
-        """Return f of each sensor alone, and its derivatives by place, shear, and ln force."""
+    def _sources(self, places: FloatArray, force: FloatArray, shear: FloatArray) -> ArrayTriple:
+        """Return f of each sensor alone with shear, and its derivatives by place and by shear."""
         offsets = places[:, None] - self.centres
-        table, growth = self._looked_up(offsets, force, 4)
+        table = self._looked_up(offsets, force, 4)
         pull = np.einsum("mnk,mk->mn", offsets, shear)
-        value = table[..., 0] + pull * table[..., 2]
         along = offsets * (table[..., 1] + pull * table[..., 3])[..., None]
         along += shear[:, None] * table[..., 2:3]
-        return value, along, offsets * table[..., 2:3], growth[..., 0] + pull * growth[..., 2]
+        return table[..., 0] + pull * table[..., 2], along, offsets * table[..., 2:3]
 
-    def _looked_up(self, offsets: FloatArray, force: FloatArray | None, columns: int) -> ArrayPair:
-        """Return the profiles at offsets, (m, n, columns), and their change with ln force."""
-        _, loads, radii, _ = self.profiles.shape
+    def _looked_up(
+        self, offsets: FloatArray, force: FloatArray | float, columns: int
+    ) -> FloatArray:
+        """Return the first profiles at offsets and forces, (m, n, columns), interpolated."""
+        _, kernels, radii, _ = self.profiles.shape
         table = self.profiles[..., :columns].reshape(-1, columns)
-        apart = np.sqrt(np.einsum("mnk,mnk->mn", offsets, offsets)) / self.step
+        apart = np.sqrt(np.einsum("mnk,mnk->mn", offsets, offsets)) / self.radii[1]
         apart = np.minimum(apart, radii - 1.001)
         start = apart.astype(np.intp)
         share = (apart - start)[..., None]
-        start += self.owner * (loads * radii)
-
-        def at(first: IndexArray) -> FloatArray:
+        start += radii * (np.arange(self.sensors.size) % kernels)
+        found = np.zeros((*apart.shape, columns))
+        for level, weight in self._levels(force):
+            first = start + kernels * radii * level
             lower = table.take(first, axis=0)
-            return floats(lower + share * (table.take(first + 1, axis=0) - lower))
+            found += weight * (lower + share * (table.take(first + 1, axis=0) - lower))
+        return found
 
-        if loads == 1:
-            found = at(start)
-            return found, np.zeros_like(found)
-        force = np.full(len(offsets), self.array.load) if force is None else force
-        steps = np.log(self.loads)
-        wanted = np.clip(np.log(np.maximum(force, self.loads[0])), steps[0], steps[-1])
-        level = np.minimum(np.searchsorted(steps, wanted, side="right"), loads - 1) - 1
-        less, more = (at(start + radii * (level + i)[:, None]) for i in (0, 1))
-        slope = (more - less) / (steps[level + 1] - steps[level])[:, None, None]
-        return less + (wanted - steps[level])[:, None, None] * slope, slope
-
-    def _interpolated(self, table: FloatArray, apart: FloatArray) -> FloatArray:
-        """Return what stands in a table (radii,) or (radii, c) at distances."""
-        place = np.minimum(apart / self.step, len(table) - 1.001)
-        start = place.astype(np.intp)
-        share = (place - start).reshape(*place.shape, *(1,) * (table.ndim - 1))
-        return (1 - share) * table[start] + share * table[start + 1]
-
-
-#: Value, by place, by shear, by ln force.
-FieldParts = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
+    def _levels(self, force: FloatArray | float) -> Iterator[tuple[FloatArray, FloatArray]]:
+        """Yield the tables around forces, and the share of each."""
+        count = self.loads.size
+        # The stress falls by the square of the contact radius, which Hertz has as P^(2/3).
+        place = np.interp(np.power(force, 2 / 3), self.loads ** (2 / 3), np.arange(count))
+        level = np.reshape(place, (-1, 1))
+        below = np.minimum(level.astype(np.intp), max(count - 2, 0))
+        share = (level - below)[..., None]
+        yield below, 1 - share
+        if count > 1:
+            yield below + 1, share
 
 
 def receptive_fields(array: ArrayData, indenter: RoundIndenter | None = None) -> ReceptiveFields:
@@ -188,64 +167,56 @@ def receptive_fields(array: ArrayData, indenter: RoundIndenter | None = None) ->
     reach = float(np.linalg.norm(np.ptp(centres, axis=0) + 2 * MARGIN * film.thickness))
     nodes = Wavenumbers.covering(_LARGEST_KH / film.thickness, reach)
     radii = np.arange(0.0, reach, film.thickness / _STEPS)
-    step = radii[1]
-    radii[0] = _AXIS * step
+    kernels = array.kernels[sensors] if len(array.kernels) > 1 else array.kernels
     at = np.minimum(nodes.k, array.k[-1])
-    own = array.kernels[sensors] if len(array.kernels) > 1 else array.kernels
-    kernels = radial_spline(array.k, own.T)(at).T
+    kernels = radial_spline(array.k, kernels.T)(at).T
     loads, contact_radii, pressures = _pressures(film, indenter, array.load, nodes.k)
     set_up = SetUp(film, array.indenter, array.load, None)
     by_pressure, by_shear = base_response(nodes.k * film.thickness, film.poisson_ratio)
     transfer = film_transfer(set_up, nodes)
     if array.reference is not None:
         linear = RadialSpectrum(nodes, by_pressure)
-        stress = array.load * radial_spline(array.k, array.reference)(at)
-        change = stress - rod_spectrum(set_up, linear, LINEAR)
+        change = array.load * radial_spline(array.k, array.reference)(at)
+        change -= rod_spectrum(set_up, linear, LINEAR)
         transfer = by_pressure + per_pressure(set_up, linear, change)
 
-    spectra = (kernels[:, None] * (transfer * pressures)).reshape(-1, nodes.k.size).T
+    spectra = (pressures[:, None] * transfer * kernels).reshape(-1, nodes.k.size).T
     falling = -nodes.k[:, None] * spectra
     # A sensor is seen from the contact in the direction opposite to their offset.
     ratio = -(by_shear / by_pressure)[:, None]
-    r = radii[:, None]
+    r = np.maximum(radii, _AXIS * radii[1])
     columns = np.array(
         [
-            nodes.synthesise(spectra, radii),
-            nodes.synthesise(falling, radii, order=1) / r,
-            nodes.synthesise(ratio * spectra, radii, order=1) / r,
-            nodes.synthesise(ratio * falling, radii, order=2) / r**2,
+            nodes.synthesise(spectra, r),
+            nodes.synthesise(falling, r, order=1) / r[:, None],
+            nodes.synthesise(ratio * spectra, r, order=1) / r[:, None],
+            nodes.synthesise(ratio * falling, r, order=2) / r[:, None] ** 2,
         ]
     )
-    shape = (len(kernels), loads.size, radii.size, len(columns))
-    # From (columns, radii, kernels and loads).
-    profiles = np.ascontiguousarray(columns.transpose(2, 1, 0)).reshape(shape)
+    shape = (len(pressures), len(kernels), radii.size, len(columns))
 
     # What is uncertain is taken at the middle load, and of the mean kernel.
-    pressure = pressures[len(pressures) // 2]
-    modes = radial_spline(array.k, array.modes.changes.T)(at)
-    mean = kernels.mean(axis=0)
-    changes = {name: change * pressure for name, change in film_changes(set_up, nodes).items()}
-    ends = more_and_less(indenter, "radius") if indenter else None
-    if ends:
-        more, less, share = ends
-        upper, lower = (_pressures(film, i, array.load, nodes.k)[2] for i in (more, less))
-        name = "rod_radius" if indenter == array.indenter else "indenter"
-        middle = len(upper) // 2
-        changes[name] = share * transfer * (upper[middle] - lower[middle])
+    modes = radial_spline(array.k, array.modes.changes.T)(at).T * transfer
+    names = [*array.effects]
+    inputs = {n: c for n, c in film_changes(set_up, nodes).items() if n in names}
+    changes = np.vstack([modes, *(kernels.mean(axis=0) * change for change in inputs.values())])
+    changes = changes * pressures[len(pressures) // 2]
+    first = array.root.shape[1]
+    by_input = np.zeros((len(inputs), array.columns.shape[1]))
+    for row, name in zip(by_input, inputs, strict=True):
+        row[first + names.index(name)] = 1.0
     return ReceptiveFields(
         array=array,
         sensors=sensors,
         centres=centres,
         mixing=(array.crosstalk * array.conversion_constants)[np.ix_(sensors, sensors)],
-        step=step,
-        owner=np.arange(sensors.size) % len(kernels),
+        radii=radii,
         loads=loads,
         contact_radii=contact_radii,
-        profiles=profiles,
-        of_modes=nodes.synthesise(modes * (transfer * pressure)[:, None], radii),
-        of_inputs={
-            name: nodes.synthesise(mean * change, radii) for name, change in changes.items()
-        },
+        profiles=np.ascontiguousarray(columns.transpose(2, 1, 0)).reshape(shape),
+        changes=nodes.synthesise(changes.T, radii).T,
+        owner=np.append(array.modes.owner, np.full(len(inputs), ALL)),
+        sizes=np.vstack([array.split(array.columns)[4], by_input]),
     )
 
 
@@ -255,18 +226,12 @@ def _pressures(
     """Return loads, contact radii, and transforms of the pressure per newton, (loads, nodes)."""
     if indenter is None:
         return np.array([load]), np.zeros(1), np.ones((1, k.size))
-    loads = [load]
-    if not isinstance(indenter, Rod):
-        loads = [load * share for share in _LOADS]
-    while True:
-        try:
-            contacts = indent(film, indenter, load=loads, strain="linear")
-            break
-        except DomainError:
-            # The largest loads go through the film.
-            loads = loads[:-1]
-            if not loads:
-                raise
+    loads = np.array([load]) if isinstance(indenter, Rod) else load * _LOADS
+    try:
+        contacts = indent(film, indenter, load=loads, strain="linear")
+    except DomainError:
+        # The largest loads go through the film.
+        loads = loads[: loads.size // 2]
+        contacts = indent(film, indenter, load=loads, strain="linear")
     transforms = [2 * np.pi * one.traction.pressure_transform(k) / one.load for one in contacts]
-    radii = [one.contact_radius for one in contacts]
-    return np.array(loads), np.array(radii), np.array(transforms)
+    return loads, floats([one.contact_radius for one in contacts]), floats(transforms)

@@ -52,8 +52,8 @@ def test_without_noise_contacts_are_where_they_press(array, true, indenter, seed
     places, forces = drawn(array, np.random.default_rng(seed), 12)
     u = true.readings(places, forces, indenter=indenter)
     found = array.locate(u, indenter=indenter or "point", shear=0.0)
-    np.testing.assert_allclose(found.x, places[:, 0], atol=3e-6)
-    np.testing.assert_allclose(found.y, places[:, 1], atol=3e-6)
+    np.testing.assert_allclose(found.x, places[:, 0], atol=8e-6)
+    np.testing.assert_allclose(found.y, places[:, 1], atol=8e-6)
     np.testing.assert_allclose(found.force, forces, rtol=3e-3)
     assert set(found.flags) == {""}
 
@@ -216,7 +216,7 @@ def test_the_assumed_shear_is_always_said():
     u = TRUE_GRID.readings(np.zeros((1, 2)), 1.0)
     found = GRID.locate(u, indenter=ROD)
     assert found.assumed_shear == 0.3
-    assert "0 ± 0.3 of the normal force" in found.answer()
+    assert "shear over normal force of 0 ± 0.3" in found.answer()
     assert "no shear" in GRID.locate(u, indenter=ROD, shear=0.0).answer()
     assert found.to_dict()["assumed_shear"] == 0.3
     frame = found.to_dataframe()
