@@ -90,9 +90,12 @@ def answer(result: Calibrated) -> str:
         cures = [EXPLANATIONS[kind][1] for kind in dict.fromkeys(failed) if kind in EXPLANATIONS]
         return f"A = {a}{by} is in doubt.{alone} {checks}\nWhat to do: {'; '.join(cures)}.{law}"
     if not failed:
-        sigma = measured_text(apparatus.parameters, "gaussian_sigma")
-        suffices = f"Its Gaussian of σ = {sigma} suffices: the scan shows no departure."
-        return f"Use A = {a}{by}.{alone} {checks}\n{suffices}{law}"
+        suffices = ""
+        # A sensor of an array is not tested for it.
+        if any(check.kind == "gaussian_misfit" for check in apparatus.checks):
+            sigma = measured_text(apparatus.parameters, "gaussian_sigma")
+            suffices = f"\nIts Gaussian of σ = {sigma} suffices: the scan shows no departure."
+        return f"Use A = {a}{by}.{alone} {checks}{suffices}{law}"
     rows = _explanations(apparatus)
     rivals = [row for row in rows if row["named"] and row["name"] != DEPARTURE]
     settled = ": which A to use is not settled" if rivals else ""

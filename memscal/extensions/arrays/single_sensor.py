@@ -120,6 +120,8 @@ def _reconvolution(array: ArrayData, i: int, spectra: FloatArray) -> Reconvoluti
     away = np.stack([readings.x, readings.y]) - array.places[i][:, None]
     distance = np.hypot(*away)
     signals = array.conversion_constants[i] * readings.load * array.radial(spectra.T, distance).T
+    # The Gaussian has an A of its own.
+    signals[1] *= (signals[0] @ signals[1]) / (signals[1] @ signals[1])
     own, gaussian = signals + readings.background[i]
     residual = readings.u[i] - readings.predicted[i]
     columns = {
