@@ -49,6 +49,9 @@ def _tables(contents: Item) -> Iterator[Table]:
     rows += [(name, contents[name]) for name in named]
     yield Table(contents["file"], ("", ""), rows)
 
+    sensors = contents.get("sensors", ())
+    places = [(item["name"], *map(_number, item["place"])) for item in sensors]
+    yield Table(f"Array of {len(places)} sensors", ("sensor", "x (mm)", "y (mm)"), places)
     quantities = [(_words(item), _value(item), item["path"]) for item in contents["quantities"]]
     title = "Quantities (± standard uncertainty, k = 1)"
     yield Table(title, ("quantity", "value", "path"), quantities)
@@ -76,8 +79,8 @@ def _arrays(arrays: Sequence[Item]) -> Table:
     rows = []
     for item in arrays:
         shape = " x ".join(str(n) for n in item["shape"]) or "one"
-        low = _number(item["minimum"], ".5g")
-        row = [item["path"], shape, low, _number(item["maximum"], ".5g"), item["unit"]]
+        low = _number(item["minimum"])
+        row = [item["path"], shape, low, _number(item["maximum"]), item["unit"]]
         if missing:
             row.append(str(item["missing"] or "-"))
         rows.append(row)
@@ -116,7 +119,7 @@ def _unit_to_show(item: Item) -> tuple[float, str]:
     return 1.0, unit
 
 
-def _number(value: float | None, form: str) -> str:
+def _number(value: float | None, form: str = ".5g") -> str:
     return "-" if value is None else f"{value:{form}}"
 
 

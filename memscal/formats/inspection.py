@@ -103,7 +103,7 @@ def describe(path: FilePath, *, accept_altered: bool = False) -> Values:
     with open_hdf5(path, accept_altered=accept_altered) as file:
         schema = _schema(file)
         version = require_schema(file, schema)
-        _kind(schema)[0](file)
+        held = _kind(schema)[0](file)
         quantities = []
         arrays = []
         provenance = []
@@ -114,7 +114,7 @@ def describe(path: FilePath, *, accept_altered: bool = False) -> Values:
                     provenance.append((place, quantity))
                 elif quantity.axes and file.array(place).ndim:
                     arrays.append(_array_row(file, place))
-                elif value == place:
+                elif value == place and quantity.dimension != "names":
                     quantities.append(_quantity_row(file, place))
                 elif quantity.of is not None and value not in [q["path"] for q in quantities]:
                     quantities.append(_quantity_row(file, value if file.has(value) else place))
@@ -136,6 +136,7 @@ def describe(path: FilePath, *, accept_altered: bool = False) -> Values:
             "schema": schema,
             "schema_version": version,
             "title": file.optional_text("/entry/title"),
+            **_sensors(held),
             "quantities": quantities,
             "arrays": arrays,
             "checks": checks,
@@ -217,6 +218,16 @@ def _quantity_row(file: SafeFile, path: str) -> Values:
         "standard_uncertainty": _uncertainty(file, path),
         "unit": unit,
     }
+
+
+def _sensors(held: Any) -> Values:
+    """Return the sensors of an array with their places by design, in mm, where they are stated."""
+    names = getattr(held, "sensors", ())
+    layout = getattr(held, "layout", None)
+    places = [(None, None)] * len(names) if layout is None else (1e3 * layout).tolist()
+    pairs = zip(names, places, strict=True)
+    sensors = [{"name": name, "place": place, "unit": "mm"} for name, place in pairs]
+    return {"sensors": sensors} if sensors else {}
 
 
 def _uncertainty(file: SafeFile, path: str) -> float | int | None:

@@ -141,7 +141,7 @@ SCAN_DATA = record(
 )
 SENSORS = record(
     "NXdata",
-    Quantity("sensors", "names", "names of the sensors of an array", stored="sensor_names"),
+    Quantity("sensors", "names", "sensors of an array", stored="sensor_names"),
     *along(
         ("sensor",),
         Quantity("layout_x", _L, "place of each sensor along x"),

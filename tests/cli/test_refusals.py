@@ -104,7 +104,6 @@ WRONG_USAGE = {
     "$columns --young-modulus 1,75": "Write a decimal point",
     "$columns --ceiling -1.2": "above 0",
     "$columns --load 1_0": "is not a number",
-    "$columns --u x": "--u is given twice",
     "$columns --output b.h5": "given twice",
     "$columns --thickness 1": "add --young-modulus, --poisson-ratio",
     "reference cone -o out.h5": "needs --inclination",

@@ -8,59 +8,46 @@ from helpers.builders import make_artifact, make_scan
 from helpers.records import assert_same
 
 import memscal
-from memscal import Scan, read_scan, write_scan
+from memscal import read_scan, write_scan
 from memscal.errors import InputError
 from memscal.formats.artifact import write_artifact
-from memscal.formats.inspection import check
+from memscal.formats.inspection import describe
 
-KINDS = ["line", "repeats", "raster", "points"]
 AXES = {"line": "x", "repeats": "repeat x", "raster": "y x", "points": "point"}
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", AXES)
 def test_the_scan_of_an_array_comes_back_and_holds_that_of_each_sensor(kind):
     scan = make_array_scan(kind)
     write_scan(scan, "scan.h5")
     found = read_scan("scan.h5")
     assert_same(found, scan, but=("source",))
     assert found.sensors == NAMES
-    assert f"{kind}, " in repr(found) or kind == "points"
-    assert "3 sensors" in repr(found)
     one = make_scan(kind)
     assert (found.kind, found.planar, found.shape) == (one.kind, one.planar, one.u_zz.shape)
     np.testing.assert_array_equal(found.positions, one.positions)
-    np.testing.assert_array_equal(found.passes, one.passes)
     third = found.of_sensor(2)
     assert (third.sensor.name, third.sensor.model, third.sensors) == ("µ 2", "MEMS", ())
     np.testing.assert_allclose(third.u_zz, 3 * one.u_zz)
-    assert (third.u_zz_errors == 3e-5).all()
     np.testing.assert_array_equal(third.normal_load, one.normal_load)
-    assert all(finding.passed for finding in check("scan.h5"))
+    assert describe("scan.h5")["sensors"][2] == {"name": "µ 2", "place": [2, 0.1], "unit": "mm"}
     with h5py.File("scan.h5") as file:
         data = file["/entry/data"]
         assert [*data.attrs["axes"]] == ["sensor", *AXES[kind].split()]
         assert data["u_zz"].shape == (3, *one.u_zz.shape)
         assert data["normal_load"].shape == one.u_zz.shape
-        assert data["layout_x"].attrs["units"] == "mm"
-        assert list(data["layout_x"]) == [-2, 0, 2]
 
 
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
         ({"sensors": ("a", "b", "a")}, "all different"),
-        ({"sensors": ("a", "b", "")}, "none empty"),
-        ({"sensors": "abc"}, "list of names"),
         ({"sensors": ("a", "b")}, r"u_zz has shape \(3, 33\)"),
-        ({"u_zz": np.ones((3, 32))}, r"u_zz has shape \(32,\)"),
         ({"u_zz_errors": [1e-5, 1e-5]}, r"u_zz_errors of the scan has shape \(2,\)"),
-        ({"u_zz_errors": [1e-5, 1e-5, -1e-5]}, "negative"),
         ({"normal_load": np.ones((3, 33))}, r"normal_load has shape \(3, 33\)"),
         ({"layout": [0, 1, 2]}, r"layout of the scan has shape \(3,\).*\(3, 2\)"),
         ({"layout": [[0, 0], [1, np.nan], [2, 0]]}, "finite"),
-        ({"reading_high": [1, 2]}, r"should be \(3,\)"),
         ({"channels": {"u_xz": np.ones((3, 33))}}, "further channels are: u_xz"),
-        ({"sensors": (), "u_zz": np.ones(33)}, "sensors of the scan are"),
     ],
 )
 def test_what_is_no_array_is_refused(changes, words):
@@ -68,39 +55,18 @@ def test_what_is_no_array_is_refused(changes, words):
         make_array_scan(**changes)
 
 
-def renamed(*names):
-    def write(data):
-        del data["sensor_names"]
-        data["sensor_names"] = str(list(names)).replace("'", '"')
-
-    return write
-
-
-def without(*names):
-    def write(data):
-        for name in names:
-            del data[name]
-
-    return write
-
-
-def turned(data):
-    u = data["u_zz"][...]
-    del data["u_zz"]
-    data["u_zz"] = u.T
-    data["u_zz"].attrs["units"] = "mV"
-    data.attrs["axes"] = ["x", "sensor"]
+def renamed(names):
+    return lambda data: data["sensor_names"].write_direct(np.array(names, dtype=object))
 
 
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        (renamed("T00", "T01"), r"\['T00', 'T01'\], u_zz has shape \(3, 33\)"),
-        (renamed("T00", "T01", "T00"), "all different"),
-        (without("sensor_names"), r"sensor as axis 0(.|\n)*sensor_names"),
-        (without("layout_y"), "finite"),
-        (turned, "x as axis 0, sensor as axis 1"),
-        (lambda data: data.attrs.update(axes=["x", "sensor"]), "sensor as axis 1"),
+        (renamed('["T00", "T01"]'), r"\['T00', 'T01'\], u_zz has shape \(3, 33\)"),
+        (renamed('["a", "b", "a"]'), "all different"),
+        (lambda data: data.pop("sensor_names"), r"sensor as axis 0(.|\n)*sensor_names"),
+        (lambda data: data.pop("layout_y"), "finite"),
+        (lambda data: data.attrs.update(axes=["x", "sensor"]), "x as axis 0, sensor as axis 1"),
     ],
 )
 def test_a_file_whose_sensors_do_not_fit_is_refused(change, words):
@@ -108,17 +74,8 @@ def test_a_file_whose_sensors_do_not_fit_is_refused(change, words):
     with h5py.File("scan.h5", "r+") as file:
         del file.attrs["memscal_content_sha256"]
         change(file["/entry/data"])
-    with pytest.raises(InputError, match=words) as refused:
+    with pytest.raises(InputError, match=words):
         read_scan("scan.h5")
-    assert "scan.h5" in str(refused.value)
-    assert not check("scan.h5")[-1].passed
-
-
-def test_as_many_sensors_as_rows_and_columns_stay_apart():
-    u = np.arange(27.0).reshape(3, 3, 3)
-    side = np.arange(3) * 1e-3
-    write_scan(Scan(x=side, y=side, u_zz=u, sensors=NAMES), "scan.h5")
-    np.testing.assert_array_equal(read_scan("scan.h5").u_zz, u)
 
 
 def test_a_reader_of_one_sensor_refuses_an_array():
