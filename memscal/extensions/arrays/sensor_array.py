@@ -13,6 +13,7 @@ from memscal.extensions.arrays.bound import bound, predict
 from memscal.extensions.arrays.contacts import Contacts
 from memscal.extensions.arrays.locate import Touch, locate
 from memscal.extensions.arrays.single_sensor import single_sensor
+from memscal.extensions.arrays.stream import Stream
 from memscal.formats.hdf5.reader import open_hdf5
 from memscal.formats.hdf5.writer import ARTIFACT_SCHEMA, SCHEMA_ATTRIBUTE
 from memscal.model.arrays import FloatArray, keyword_array_record
@@ -189,6 +190,62 @@ class SensorArray(ArrayData, Shown, Gridded):
         True
         """
         return bound(self, places, force, indenter, shear)
+
+    def stream(
+        self,
+        rate: float = 1000.0,
+        limit: tuple[ArrayLike, ArrayLike] | None = None,
+        drift: tuple[float, float] | None = None,
+        indenter: Touch = "point",
+    ) -> Stream:
+        """Return a stream: frames are pushed into it, and it says what presses, drift or not.
+
+        Baselines are tracked by a Kalman filter in blocks of 0.2 s, in which a contact is a diffuse
+        nuisance (:mod:`memscal.extensions.arrays.stream`): drift is common to the sensors, a
+        contact is local, and stays however long it lasts.  What presses in the first block is
+        taken for the baseline.  A sensor that is dead, has not changed for 1 s, or that alone
+        contradicts all others for most of a second, is left out (:attr:`Stream.left_out`); one
+        that was stuck returns when it changes.  Contacts are assumed to be without shear: one of
+        Q over P moves the place by about 0.35 h Q/P, h being the film's thickness.
+
+        A frame is judged by the baselines at the end of the last block.  However a stream is cut
+        into what is pushed, its records are the same but for rounding.
+
+        Parameters
+        ----------
+        rate : float
+            Frames per second.
+        limit : (low, high), optional
+            Readings at or beyond them are left out, in the readings' SI unit, for all sensors or
+            (n,) each; that of the scan without it.
+        drift : (common, own), optional
+            Standard deviations of the change of baselines in 1 s, in the readings' SI unit: in
+            common, and of each sensor by itself.  Without it that of three strengths is taken under
+            which the readings are most probable.
+        indenter : "point", Rod or Sphere
+            What presses.
+
+        Raises
+        ------
+        InputError
+            If the rate is not above zero, or the indenter is another one.
+
+        Examples
+        --------
+        >>> import memscal
+        >>> import numpy as np
+        >>> scan = memscal.simulate(array=(1, 5), pitch=2e-3, crosstalk=0.01, seed=1)
+        >>> array = memscal.calibrate_array(scan).array
+        >>> stream = array.stream(rate=100)
+        >>> random = np.random.default_rng(1)
+        >>> def frames(readings):
+        ...     return random.multivariate_normal(readings, array.noise, size=100)
+        >>> rest = stream.push(frames(np.zeros(5)))
+        >>> held = stream.push(frames(array.predict([[0.5e-3, 0.0]], force=0.8)[0]))
+        >>> bool(rest["contact"].any()), round(float(held["force"].mean()), 2)
+        (False, 0.8)
+        """
+        return Stream(self, rate, limit, drift, indenter)
 
     def save(self, path: str | PathLike[str], *, overwrite: bool = False) -> None:
         """Write the array to an artifact file.

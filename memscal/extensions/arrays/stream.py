@@ -1,0 +1,398 @@
+r"""Contacts in a stream of frames, while the baselines drift under them.
+
+The baselines b are tracked in blocks of 0.2 s by a Kalman filter, in which a contact is a diffuse
+nuisance.  With P the covariance of b, R that of the noise of a block's mean and H(r) the readings
+per newton of a contact at r:
+
+.. math::
+
+    P \leftarrow P + Q, \quad S = P + R, \quad e = \bar u - b, \quad
+    z(r) = \frac{H^T S^{-1} e}{\sqrt{H^T S^{-1} H}}
+
+A contact is there if z exceeds 5 at a node of a grid of places.  With J = [H_x, H_y, H] at its
+place, and M = S^-1 without a contact,
+
+.. math::
+
+    M = S^{-1} - S^{-1} J (J^T S^{-1} J)^{-1} J^T S^{-1}, \quad
+    b \leftarrow b + P M e, \quad P \leftarrow P - P M P .
+
+Drift is common to all sensors and a contact is local: that separates them, and not a constant of
+time.  The random walks have :math:`Q = q_c 1 1^T + q I`; the filter runs at several strengths of
+them at once, and the one under which the readings are most probable holds.
+"""
+
+from __future__ import annotations
+
+from copy import deepcopy
+from enum import IntFlag
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.special import chdtri
+
+from memscal.errors import InputError
+from memscal.extensions.arrays.array_data import ArrayData
+from memscal.extensions.arrays.locate import DETECTED, Seeking, Touch, columns_of, patterns
+from memscal.model.arrays import (
+    TINY,
+    BoolArray,
+    Columns,
+    FloatArray,
+    IndexArray,
+    array_record,
+    floats,
+    require_positive,
+)
+from memscal.model.checks import FALSE_ALARM
+
+#: Duration of a block of the filter, in s, and for how long a stuck sensor is unchanged.
+_BLOCK = 0.2
+_PATIENCE = 1.0
+#: Contacts are sought so many thicknesses beyond the sensors, on a grid of this step; steps of
+#: Gauss-Newton from its best node, each of at most a step of the grid.
+_MARGIN = 1.0
+_STEP = 0.5
+_STEPS = 3
+#: Significance at which a block's contact is kept out of the baselines: sooner than it is reported.
+_SPARED = 3.5
+#: Random walks of single sensors in 1 s, over the array's largest reading; the common one over it.
+#: The first holds until the readings tell.
+_STRENGTHS = np.array([0.04, 0.008, 0.2]) / 100
+_COMMON = 10.0
+#: Share of the evidence for a strength that a block leaves: it fades in 10 minutes.
+_KEPT = 1 - _BLOCK / 600
+#: A baseline that is not known may be so many largest readings away.
+_DIFFUSE = 10.0
+#: Share of the last second's blocks that one sensor alone contradicts, at which it is dropped.
+_DROPPED = 0.5
+
+
+class FrameFlag(IntFlag):
+    """What is to be said of a frame; the flags add up."""
+
+    NO_READING = 1
+    """Too few sensors with a known baseline to find a contact."""
+    MISSING = 2
+    """A reading is NaN."""
+    SATURATED = 4
+    """A reading is at an end of its range, and left out."""
+    EDGE = 8
+    """The contact is outside the sensors."""
+    DROPPED = 16
+    """A sensor is left out: dead in the calibration, stuck, or it contradicts all others."""
+    TWO_CONTACTS = 32
+    """One contact does not explain the readings."""
+
+
+#: What is known of a frame.
+FRAME = np.dtype(
+    {
+        "names": ["t", "contact", "x", "y", "force", "covariance", "chi2", "flags"],
+        "formats": ["f8", "?", "f8", "f8", "f8", "(3,3)f8", "f8", "i8"],
+    }
+)
+
+
+@array_record
+class _Fit:
+    """What readings (m, n) say of one contact each; f of them have one, of c parameters."""
+
+    rows: IndexArray  # (f,): which
+    node: IndexArray  # (f,): of the grid, near the place
+    place: FloatArray  # (f, 2), in m
+    force: FloatArray  # (f,), in N
+    chi2: FloatArray  # (m,)
+    jacobian: FloatArray  # (f, c, n): changes by x (and y) and by force
+    covariance: FloatArray  # (f, c, c): of these
+
+
+@array_record
+class _Errors:
+    """What errors of the array do to a contact of 1 N."""
+
+    readings: FloatArray  # (n, n): covariance, in V^2
+    contact: FloatArray  # (c, c): covariance of x (and y) in m and force in N
+    misfit: float  # chi-square that no contact explains
+
+
+class Stream:
+    """Contacts in frames that arrive; made by :meth:`SensorArray.stream`."""
+
+    Flag = FrameFlag
+    """Names of the bits of the field ``flags`` of a record."""
+
+    def __init__(
+        self,
+        array: ArrayData,
+        rate: float,
+        limit: tuple[ArrayLike, ArrayLike] | None,
+        drift: tuple[float, float] | None,
+        indenter: Touch,
+    ) -> None:
+        require_positive("rate", rate, "Hz")
+        self._array = array
+        self._rate = rate
+        self._length = max(1, round(_BLOCK * rate))
+        low, high = limit or (array.reading_low, array.reading_high)
+        # What is not stated is NaN, which nothing exceeds.
+        self._low = np.array(low, float)
+        self._high = np.array(high, float)
+        self._seeking = Seeking.on(array, indenter, 0.0, _MARGIN)
+        self._told = np.array([*self._seeking.axes, 2])
+        self._sensors = self._seeking.fields.sensors
+        self._nodes = self._seeking.grid(_STEP)
+        self._grid = self._seeking.fields.normal(self._nodes)[0]
+        self._errors: dict[int, _Errors] = {}
+        self._noise = array.noise[np.ix_(self._sensors, self._sensors)]
+        self._peak = array.load * self._grid.max()
+        own = self._peak * _STRENGTHS
+        common = _COMMON * own
+        if drift is not None:
+            common, own = floats(drift)[:, None]
+        n = self._sensors.size
+        walk = np.multiply.outer(common**2, np.ones((n, n)))
+        walk += np.multiply.outer(own**2, np.eye(n))
+        self._walk = walk * self._length / rate
+        self._now = SimpleNamespace(
+            frames=np.array(0),
+            last=np.zeros(n),
+            # Of the current block.
+            sums=np.zeros(n),
+            counts=np.zeros(n),
+            changed=np.zeros(n, bool),
+            # In seconds, and the share of blocks that a sensor alone contradicts.
+            unchanged=np.zeros(n),
+            doubt=np.zeros(n),
+            # By strength of the drift; a baseline that is not known is NaN.
+            baselines=np.full((own.size, n), np.nan),
+            covariance=np.zeros((own.size, n, n)),
+            evidence=np.zeros(own.size),
+        )
+
+    @property
+    def left_out(self) -> dict[str, str]:
+        """Why sensors are left out at present, by their names."""
+        reasons = dict.fromkeys(self._array.sensors, "dead in the calibration")
+        stuck = self._now.unchanged >= _PATIENCE
+        for sensor, is_stuck, kept in zip(self._sensors, stuck, self._kept(), strict=True):
+            name = self._array.sensors[sensor]
+            reasons[name] = "unchanged for 1 s" if is_stuck else "contradicts all others"
+            if kept:
+                del reasons[name]
+        return reasons
+
+    def push(self, block: ArrayLike) -> NDArray[Any]:
+        """Take frames, and return what presses in each of them.
+
+        Parameters
+        ----------
+        block : array_like, shape (m, n)
+            Readings of the n sensors of the array in their order, in V; NaN is missing.  Any m.
+
+        Returns
+        -------
+        ndarray, shape (m,)
+            A record a frame: ``t`` (s, since the first frame), ``contact``, ``x`` and ``y`` (m;
+            NaN without a contact), ``force`` (N; 0 without), ``covariance`` (3, 3) of x, y and
+            force by noise, baselines and array, ``chi2``, and ``flags``
+            (:class:`FrameFlag`).
+
+        Raises
+        ------
+        InputError
+            If the block does not have a column for each sensor.
+        """
+        readings = columns_of(self._array, block, "block")
+        records = np.zeros(len(readings), FRAME)
+        start = 0
+        while start < len(readings):
+            stop = start + self._length - self._now.frames % self._length
+            self._take(readings[start:stop], records[start:stop])
+            if self._now.frames % self._length == 0:
+                self._finish_block()
+            start = stop
+        return records
+
+    def state(self) -> Columns:
+        """Return what the stream remembers, as arrays by their names."""
+        return deepcopy(vars(self._now))
+
+    def restore(self, state: Columns) -> None:
+        """Continue where a stream of the same array and arguments had this state.
+
+        Raises
+        ------
+        InputError
+            If the state is not of such a stream.
+        """
+        now = vars(self._now)
+        try:
+            restored = {
+                name: np.array(state[name], value.dtype).reshape(value.shape)
+                for name, value in now.items()
+            }
+        except (KeyError, TypeError, ValueError) as error:
+            raise InputError(
+                f"The state is not of a stream of this array and these arguments: {error}."
+            ) from error
+        now.update(restored)
+
+    def _kept(self) -> BoolArray:
+        """Which sensors are neither stuck nor in doubt."""
+        now = self._now
+        kept: BoolArray = (now.unchanged < _PATIENCE) & (now.doubt < _DROPPED)
+        return kept
+
+    def _take(self, given: FloatArray, records: NDArray[Any]) -> None:
+        """Fill the records of frames within one block of the filter."""
+        now = self._now
+        saturated = ((given <= self._low) | (given >= self._high))[:, self._sensors]
+        readings = given[:, self._sensors]
+        missing = ~np.isfinite(readings)
+        valid = ~(missing | saturated) & self._kept()
+        now.changed |= (readings != np.vstack([now.last, readings[:-1]])).any(axis=0)
+        now.last = readings[-1]
+        now.sums += np.where(valid, readings, 0.0).sum(axis=0)
+        now.counts += valid.sum(axis=0)
+
+        records["t"] = (now.frames + np.arange(len(records))) / self._rate
+        now.frames += len(records)
+        for name in ("x", "y", "covariance"):
+            records[name] = np.nan
+        records["flags"] = (
+            FrameFlag.MISSING * missing.any(axis=1)
+            + FrameFlag.SATURATED * saturated.any(axis=1)
+            + FrameFlag.DROPPED * bool(self.left_out)
+        )
+        best = now.evidence.argmax()
+        covariance = now.covariance[best] + self._walk[best] + self._noise
+        deviations = readings - now.baselines[best]
+        for seen, frames in patterns(valid & np.isfinite(deviations)):
+            freedom = seen.sum() - self._told.size
+            if freedom < 0:
+                records["flags"][frames] |= FrameFlag.NO_READING
+                records["force"][frames] = np.nan
+                continue
+            weight = floats(np.linalg.inv(_block(covariance, seen)) * seen)
+            fit = self._fit(np.where(seen, deviations[frames], 0.0), weight, DETECTED)
+            records["chi2"][frames] = fit.chi2
+            rows = frames[fit.rows]
+            records["contact"][rows] = True
+            records["x"][rows] = fit.place[:, 0]
+            records["y"][rows] = fit.place[:, 1]
+            records["force"][rows] = fit.force
+            errors = [self._errors_at(node) for node in fit.node]
+            # Those of the place do not depend on the force, that of the force grows with it.
+            shares = np.array([error.contact for error in errors]).reshape(fit.covariance.shape)
+            shares[:, -1] *= fit.force[:, None]
+            shares[..., -1] *= fit.force[:, None]
+            records["covariance"][np.ix_(rows, self._told, self._told)] = fit.covariance + shares
+            misfit = fit.force**2 * [error.misfit for error in errors]
+            limit = chdtri(freedom, FALSE_ALARM) * (1 + misfit / max(freedom, 1))
+            records["flags"][rows] |= FrameFlag.TWO_CONTACTS * (fit.chi2[fit.rows] > limit)
+            records["flags"][rows] |= FrameFlag.EDGE * (self._seeking.outside(fit.place) > 0)
+
+    def _fit(self, deviations: FloatArray, weight: FloatArray, threshold: float) -> _Fit:
+        """Find one contact in each of some deviations from the baselines."""
+        seeking = self._seeking
+        filtered = self._grid @ weight
+        size = np.sqrt(np.sum(filtered * self._grid, axis=1)) + TINY
+        significance = deviations @ (filtered.T / size)
+        node = significance.argmax(axis=1)
+        rows = np.flatnonzero(significance.max(axis=1) > threshold)
+        node = node[rows]
+        place = self._nodes[node]
+        force = significance[rows, node] / size[node]
+        longest = _STEP * seeking.thickness
+        for _ in range(_STEPS):
+            value, by_x, by_y = seeking.fields.normal(place, force)
+            scale = force[:, None]
+            jacobian = np.stack([scale * by_x, scale * by_y, value], axis=1)[:, self._told]
+            # A product with one large matrix is faster than one with each small one.
+            filtered = jacobian.reshape(-1, len(weight)) @ weight
+            filtered = filtered.reshape(jacobian.shape)
+            covariance = np.linalg.inv(filtered @ jacobian.swapaxes(1, 2))
+            slope = np.einsum("fin,fn->fi", filtered, deviations[rows])
+            # Readings are linear in the force, not in its change.
+            step = np.einsum("fij,fj->fi", covariance, slope)
+            force = step[:, -1]
+            place[:, seeking.axes] += np.clip(step[:, :-1], -longest, longest)
+            place = np.clip(place, seeking.low, seeking.high)
+        chi2 = np.sum(deviations @ weight * deviations, axis=1)
+        chi2[rows] -= np.sum(step * slope, axis=1)
+        return _Fit(rows, node, place, force, chi2, jacobian, covariance)
+
+    def _errors_at(self, node: int) -> _Errors:
+        """Return what errors of the array do to a contact of 1 N at a node of the grid."""
+        if node not in self._errors:
+            contact = self._nodes[[node]], np.ones(1), np.zeros((1, 2))
+            [root] = self._seeking.fields.errors(*contact)
+            slopes = self._seeking.fields.forward(*contact)[1][0][:, self._told]
+            weighted = np.linalg.solve(self._noise, slopes)
+            moved = np.linalg.solve(slopes.T @ weighted, weighted.T @ root)
+            left = root - slopes @ moved
+            misfit = np.sum(left * np.linalg.solve(self._noise, left))
+            self._errors[node] = _Errors(root @ root.T, moved @ moved.T, misfit)
+        return self._errors[node]
+
+    def _finish_block(self) -> None:
+        """Move the baselines by the means of a block."""
+        now = self._now
+        mean = now.sums / np.maximum(now.counts, 1)
+        seen = now.counts >= self._length / 2
+        now.unchanged = np.where(now.changed, 0.0, now.unchanged + self._length / self._rate)
+        now.baselines[:, ~self._kept()] = np.nan
+        begin = seen & np.isnan(now.baselines[0])
+        now.baselines[:, begin] = mean[begin]
+        now.covariance += self._walk
+        now.covariance *= np.multiply.outer(~begin, ~begin)
+        now.covariance += (_DIFFUSE * self._peak) ** 2 * np.diag(begin)
+        if seen.sum() > self._told.size:
+            self._update(np.where(seen, mean - now.baselines, 0.0), seen)
+        for name in ("sums", "counts", "changed"):
+            vars(now)[name][:] = 0
+
+    def _update(self, deviations: FloatArray, seen: BoolArray) -> None:
+        """Move the baselines by deviations (strengths, n) from them."""
+        now = self._now
+        best = now.evidence.argmax()
+        noise = self._noise / np.sqrt(np.multiply.outer(now.counts, now.counts) + TINY)
+        summed = _block(now.covariance + noise, seen)
+        weight = np.linalg.inv(summed[best]) * seen
+        fit = self._fit(deviations[[best]], weight, _SPARED)
+        jacobian = fit.jacobian.reshape(-1, seen.size)
+        for node, force in zip(fit.node, fit.force, strict=True):
+            summed += force**2 * _block(self._errors_at(node).readings, seen)
+        weight = np.linalg.inv(summed) * seen
+        filtered = weight @ jacobian.T
+        information = jacobian @ filtered
+        weight -= filtered @ np.linalg.inv(information) @ filtered.swapaxes(1, 2)
+        pulls = np.einsum("sij,sj->si", weight, deviations)
+        chi2 = np.sum(pulls * deviations, axis=1)
+
+        freedom = seen.sum() - len(jacobian)
+        limit = chdtri(freedom, FALSE_ALARM)
+        if chi2[best] < limit:
+            determinants = np.linalg.slogdet(summed)[1] + np.linalg.slogdet(information)[1]
+            now.evidence = _KEPT * now.evidence - (chi2 + determinants) / 2
+        # What chi-square loses without one of the sensors.
+        alone = pulls[best] ** 2 / (np.diag(weight[best]) + TINY)
+        guilty = (alone == alone.max()) & (chi2[best] > limit) & (chi2[best] - alone < limit)
+        change = (guilty * (freedom > 1) - now.doubt) * _BLOCK / _PATIENCE
+        now.doubt += np.where(now.doubt < _DROPPED, change, 0.0)
+
+        # What one contact does not explain moves the baselines less.
+        share = limit / np.maximum(chi2, limit)
+        gain = share[:, None, None] * now.covariance @ weight
+        now.baselines += np.einsum("sij,sj->si", gain, deviations)
+        now.covariance -= gain @ now.covariance
+        # By rounding alone it would grow asymmetric, from block to block.
+        now.covariance = (now.covariance + now.covariance.swapaxes(1, 2)) / 2
+
+
+def _block(covariance: FloatArray, seen: BoolArray) -> FloatArray:
+    """Return covariances with ones in place of the sensors that are not seen."""
+    return np.where(np.multiply.outer(seen, seen), covariance, np.eye(seen.size))

@@ -1,0 +1,139 @@
+"""Streams: what presses in each frame, which sensors are left out, and how a stream continues."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from helpers.arrays import known_array
+from helpers.true_arrays import TrueArray
+
+import memscal
+from memscal.extensions.arrays.stream import FrameFlag
+
+RATE = 50
+#: A stream of 9 sensors 2 mm apart whose noise is 1 % of their largest reading.
+ARRAY = known_array(3, 3, noise=0.005)
+ARRAY = replace(ARRAY, film=replace(ARRAY.film, law="linear"))
+TRUE = TrueArray(ARRAY.places, ARRAY.conversion_constants, ARRAY.crosstalk)
+PLACE = np.array([[0.4e-3, -0.7e-3]])
+TOUCH = TRUE.readings(PLACE, 1.0, indenter=None)
+
+
+def frames(seed, seconds, signal=0.0):
+    """Frames of noise and a signal."""
+    count = round(seconds * RATE)
+    noise = np.random.default_rng(seed).normal(size=(count, 9)) * np.sqrt(ARRAY.noise[0, 0])
+    return noise + signal
+
+
+def resting(seed, array=ARRAY, **arguments):
+    """A stream that has seen 2 s without a contact."""
+    stream = array.stream(RATE, **arguments)
+    stream.push(frames(seed, 2) + 1.0)
+    return stream
+
+
+def test_a_contact_is_where_an_independent_layer_has_it_and_rest_is_rest(seed):
+    stream = resting(seed)
+    before, during, after = (
+        stream.push(frames([seed, i], 4, 1 + touch)) for i, touch in enumerate((0, TOUCH, 0))
+    )
+    assert during["contact"].all()
+    assert not np.concatenate([before, after])["contact"].any()
+    found = np.stack([during["x"], during["y"], during["force"]], axis=1)
+    truth = [*PLACE[0], 1.0]
+    # 200 frames of a known baseline: their mean is 14 times as sure as each.
+    error = found.mean(axis=0) - truth
+    stated = np.sqrt(np.diagonal(during["covariance"].mean(axis=0)))
+    assert np.all(np.abs(error) < stated)
+    np.testing.assert_allclose(found.std(axis=0), stated, rtol=0.4)
+    np.testing.assert_allclose(np.diff(during["t"]), 1 / RATE)
+
+
+def test_records_do_not_depend_on_how_a_stream_is_cut(seed):
+    readings = np.concatenate([frames(seed, 3), frames([seed, 1], 2, TOUCH)])
+    readings[20:30, 4] = np.nan
+    whole, single, odd = (ARRAY.stream(RATE) for _ in range(3))
+    expected = whole.push(readings)
+    for found in (
+        np.concatenate([single.push(frame[None]) for frame in readings]),
+        np.concatenate([odd.push(part) for part in np.array_split(readings, 7)]),
+    ):
+        for name in expected.dtype.names:
+            np.testing.assert_allclose(found[name], expected[name], rtol=1e-6, atol=1e-9)
+
+
+def test_a_restored_stream_continues_exactly(seed):
+    first = resting(seed)
+    first.push(frames([seed, 1], 1.5, 1 + TOUCH))
+    text = json.dumps({name: value.tolist() for name, value in first.state().items()})
+    second = ARRAY.stream(RATE)
+    second.restore(json.loads(text))
+    more = frames([seed, 2], 1, 1 + TOUCH)
+    assert first.push(more).tobytes() == second.push(more).tobytes()
+    with pytest.raises(memscal.MemscalError, match="state is not of a stream"):
+        known_array(2, 2).stream(RATE).restore(first.state())
+    with pytest.raises(memscal.MemscalError, match="state is not of a stream"):
+        second.restore({})
+
+
+def test_a_stuck_sensor_is_left_out_and_returns_when_it_changes(seed):
+    stream = resting(seed)
+    readings = frames([seed, 1], 8, 1 + TOUCH)
+    readings[: 4 * RATE, 4] = readings[0, 4]
+    stuck = stream.push(readings[: 4 * RATE])
+    assert stream.left_out == {"T04": "unchanged for 1 s"}
+    late = stuck[RATE + 10 :]
+    assert np.all(late["flags"] & FrameFlag.DROPPED)
+    assert late["contact"].all()
+    assert abs(late["force"].mean() - 1) < 3 * np.sqrt(late["covariance"][0, 2, 2])
+    back = stream.push(readings[4 * RATE :])
+    assert stream.left_out == {}
+    assert abs(back[RATE:]["force"].mean() - 1) < np.sqrt(back["covariance"][-1, 2, 2])
+
+
+def test_a_sensor_whose_reading_jumps_is_left_out(seed):
+    stream = resting(seed)
+    jumped = frames([seed, 1], 4, 1.0)
+    # At a corner it could be a contact outside.
+    jumped[:, 4] += 0.5 * TOUCH.max()
+    found = stream.push(jumped)
+    assert stream.left_out == {"T04": "contradicts all others"}
+    assert not found[2 * RATE :]["contact"].any()
+
+
+def test_missing_saturated_and_dead_sensors_move_nothing_else(seed):
+    used = np.arange(9) != 6
+    stream = resting(seed, replace(ARRAY, used=used), limit=(0.0, 1 + 0.8 * TOUCH.max()))
+    readings = frames([seed, 1], 1, 1 + TOUCH)
+    readings[5, 2] = readings[7] = np.nan
+    found = stream.push(readings)
+    assert stream.left_out == {"T06": "dead in the calibration"}
+    assert np.all(found["flags"] & FrameFlag.DROPPED)
+    assert np.all(found["flags"][:5] & FrameFlag.SATURATED)
+    assert np.flatnonzero(found["flags"] & FrameFlag.MISSING).tolist() == [5, 7]
+    assert np.flatnonzero(np.isnan(found["force"])).tolist() == [7]
+    assert found["flags"][7] & FrameFlag.NO_READING
+
+
+def test_two_contacts_and_one_outside_are_flagged(seed):
+    stream = resting(seed)
+    two = TRUE.readings(np.array([[-2e-3, -2e-3], [2e-3, 2e-3]]), 1.0, indenter=None).sum(axis=0)
+    outside = TRUE.readings(np.array([[2.8e-3, 0.0]]), 1.0, indenter=None)
+    for signal, flag in ((two, FrameFlag.TWO_CONTACTS), (outside, FrameFlag.EDGE)):
+        found = stream.push(frames([seed, flag], 0.1, 1 + signal))
+        assert np.all(found["flags"] & flag)
+
+
+@pytest.mark.parametrize(
+    ("work", "words"),
+    [
+        (lambda: ARRAY.stream(0.0), "rate is 0 Hz"),
+        (lambda: ARRAY.stream(RATE).push(np.zeros((5, 8))), "8 columns, but the array has 9"),
+        (lambda: ARRAY.stream(RATE, indenter="pen"), "indenter is 'pen'"),
+    ],
+)
+def test_what_is_no_stream_is_refused(work, words):
+    with pytest.raises(memscal.MemscalError, match=words):
+        work()
