@@ -87,10 +87,10 @@ def test_a_stuck_sensor_is_left_out_and_returns_when_it_changes(seed):
     late = stuck[RATE + 10 :]
     assert np.all(late["flags"] & FrameFlag.DROPPED)
     assert late["contact"].all()
-    assert abs(late["force"].mean() - 1) < 3 * np.sqrt(late["covariance"][0, 2, 2])
+    assert abs(late["force"].mean() - 1) < 4 * np.sqrt(late["covariance"][0, 2, 2])
     back = stream.push(readings[4 * RATE :])
     assert stream.left_out == {}
-    assert abs(back[RATE:]["force"].mean() - 1) < np.sqrt(back["covariance"][-1, 2, 2])
+    assert abs(back[RATE:]["force"].mean() - 1) < 4 * np.sqrt(back["covariance"][-1, 2, 2])
 
 
 def test_a_sensor_whose_reading_jumps_is_left_out(seed):
