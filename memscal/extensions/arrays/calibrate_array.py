@@ -16,7 +16,7 @@ from memscal.errors import FitError, InputError, counted, require_names
 from memscal.estimation.departures import SHAPES
 from memscal.estimation.forward import ForwardModel
 from memscal.estimation.gaussian import GaussianFit, fit_gaussian_to_points
-from memscal.estimation.points import measured_points
+from memscal.estimation.points import MINIMUM_POSITIONS, measured_points
 from memscal.estimation.reference_spectra import (
     expected_spectra,
     reference_sensitivities,
@@ -253,10 +253,17 @@ def _presses(
     keep = found.keep & np.isfinite(loads)
     x_errors = np.zeros(scan.x.size) if scan.x_errors is None else scan.x_errors
     axes = (0, 1) if single.planar else ((0,) if single.direction == "x" else (1,))
-    drift = [np.ones(u.shape[1])]
-    for axis in axes:
-        half = np.ptp(places[axis]) / 2
-        drift.append((places[axis] - places[axis].min()) / half - 1)
+    passes = scan.passes.ravel()
+    if np.bincount(passes).min() < MINIMUM_POSITIONS:
+        passes = np.zeros_like(passes)
+    # Each pass has a baseline and a drift.
+    drift = []
+    for number in range(passes.max() + 1):
+        inside = (passes == number).astype(float)
+        drift.append(inside)
+        for along in places[list(axes)]:
+            half = np.ptp(along) / 2
+            drift.append(inside * ((along - along.min()) / half - 1))
     stated = scan.u_zz_errors
     board = np.zeros(len(u), np.intp) if scan.board is None else scan.board
     return Presses(
@@ -337,7 +344,7 @@ def _begun(
     model = JointModel(presses, waves, parameters, np.zeros((forward.k.size, 0)))
     n = used.size
     drift = np.zeros((n, presses.drift.shape[1]))
-    drift[:, 0] = np.where(used, found.baseline, 0.0)
+    drift[:, :: 1 + len(presses.axes)] = np.where(used, found.baseline, 0.0)[:, None]
     transfer = gaussian_transfer(forward.k, alone.sigma)
     state = ArrayState(
         np.where(used, found.peak / found.peak[largest], 1.0),

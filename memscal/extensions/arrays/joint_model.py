@@ -204,13 +204,12 @@ class JointModel:
                 names.append(1 + np.array(places)[known])
             columns.append(of_all)
             names.append(kernel_places)
-            weight = presses.keep[i] / noise.own[i]
-            block = np.hstack(columns)
+            root = presses.keep[i] / np.sqrt(noise.own[i])
+            block = root[:, None] * np.hstack(columns)
             index = np.concatenate(names)
-            weighted = weight[:, None] * block
-            gram[np.ix_(index, index)] += block.T @ weighted
+            gram[np.ix_(index, index)] += block.T @ block
             for level, change in zip(shared, common, strict=True):
-                level[:, index] += change[i][:, None] * weighted
+                level[:, index] += (root * change[i])[:, None] * block
         if len(common):
             gram -= self._in_common(common, noise, shared)
         return Information(gram, p, int(presses.keep.sum()))
