@@ -249,6 +249,19 @@ def test_the_page_on_the_response_runs(folder, run, capsys):
     assert np.all(seen.smallest_stress > 0)
 
 
+def test_the_page_on_arrays_runs(folder, run):
+    assert "T09" in follow("arrays.md", run)["calibrate"].out
+    assert (folder / "grid.png").is_file()
+    names = run_examples("arrays.md")
+    assert np.all(names["gain"] > 1.015 * names["array"].conversion_constants)
+    contacts = names["contacts"]
+    scan = names["scan"]
+    off = [contacts.x - scan.x[10:19], contacts.y - scan.y[14], contacts.force - 1.0]
+    u = np.sqrt(np.diagonal(contacts.covariance, axis1=1, axis2=2))
+    assert np.abs(off / u.T).max() < 4.5
+    assert len(names["found"]) == 9
+
+
 def test_the_page_on_histories_runs(folder):
     history = run_examples("history.md")["history"]
     assert history.next_date > "2025-11-01"
