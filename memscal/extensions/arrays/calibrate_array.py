@@ -181,7 +181,7 @@ def calibrate_array(
         )
     require_names("There is no kernel", [kernel], get_args(KernelModel))
     if kernel == "measured":
-        from memscal.extensions.arrays.measured_fields import measured_array
+        from memscal.extensions.arrays.measured_array import measured_array
 
         return ArrayCalibration(measured_array(opened))
     request = Request(

@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 
 from memscal.extensions.arrays.array_checks import IDENTIFIED
 from memscal.extensions.arrays.bound_figure import bound_map
+from memscal.extensions.arrays.measured_figure import measured_figure
 from memscal.extensions.arrays.sensor_array import SensorArray
 from memscal.extensions.arrays.summary import array_of, identified
 from memscal.figures.report import Picture, Report
@@ -44,6 +45,8 @@ _CAPTION = (
 def array_figure(result: Any) -> Figure:
     """Draw a calibrated array."""
     array = array_of(result)
+    if array.kernel == "measured":
+        return measured_figure(array)
     deviation = np.sqrt(np.diag(array.noise))
     readings = array.readings
     residuals = (readings.u - readings.predicted) / deviation[:, None]

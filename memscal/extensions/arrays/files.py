@@ -20,6 +20,7 @@ from memscal.formats.hdf5.writer import ARRAY_SCHEMA, Group, Nodes, file_tree, t
 from memscal.formats.units import reading_of
 from memscal.model import records
 from memscal.model.arrays import Values
+from memscal.model.film import ElasticFilm
 from memscal.model.quantities import Quantity, Record, record
 
 _U_ZZ = "/entry/reconvolution/u_zz"
@@ -40,12 +41,14 @@ _PARTS = ("of_ln_a", "of_x", "of_y", "of_c", "of_mode")
 def write_array(data: ArrayData, path: FilePath, *, overwrite: bool = False) -> None:
     """Write an array as a memscal-array file; the same data, the same bytes."""
     stated = stated_in_file(data)
-    film = write_record(records.FILM, data.film)
+    # An array of measured fields may have none.
+    film: ElasticFilm | None = data.film
+    sample: Nodes = {"film": write_record(records.FILM, film)} if film else {}
     children: Nodes = {
         "title": f"Array of {len(data.sensors)} sensors",
         **{name: write_record(of.read_in(data.reading), stated) for name, of in RECORDS.items()},
         "quality": groups.quality_group(data.checks),
-        "sample": Group("NXsample", {"film": film, "depends_on": "."}),
+        "sample": Group("NXsample", {**sample, "depends_on": "."}),
         "indenter": groups.indenter_group(data.indenter, data),
         "process": write_record(records.PROCESS, data.process),
     }
@@ -57,7 +60,7 @@ def stated_in_file(data: ArrayData) -> Values:
     """Return what the groups hold, by the names of their records."""
     deviation = np.sqrt(np.diag(data.noise))
     scale = np.outer(deviation, deviation)
-    radii = RADII * np.nanmax(data.gaussian_sigmas)
+    radii = RADII * np.fmax.reduce(data.gaussian_sigmas, initial=0.0)
     stated = {
         **data.stated(),
         **vars(data.modes),
@@ -97,6 +100,7 @@ def array_from(file: SafeFile) -> ArrayData:
     if "layout_x" in read:
         read["layout"] = np.column_stack([read["layout_x"], read["layout_y"]])
     scale = np.outer(read["deviation"], read["deviation"])
+    film, indenter = groups.read_stated(file)
     read |= {
         "sensors": names,
         "used": read["used"] > 0,
@@ -106,8 +110,8 @@ def array_from(file: SafeFile) -> ArrayData:
         "modes": KernelModes(read["changes"], read["owner"].astype(np.intp)),
         "root": root,
         "effects": {name: of[:, 0] for name, of in zip(effects, changes, strict=True)},
-        "film": groups.read_film(file, "/entry/sample/film"),
-        "indenter": groups.read_round_indenter(file, "/entry/indenter"),
+        "film": film,
+        "indenter": indenter,
         "readings": ArrayReadings(**{n: read[n] for n in ArrayReadings.__dataclass_fields__}),
         "load": file.require_scalar("/entry/indenter/load", "force"),
         "reading": replace(reading, per=read["reference_unit"]),

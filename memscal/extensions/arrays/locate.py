@@ -26,6 +26,7 @@ from scipy.special import chdtrc
 from memscal.errors import InputError
 from memscal.extensions.arrays.array_data import ArrayData
 from memscal.extensions.arrays.contacts import Contacts
+from memscal.extensions.arrays.measured_fields import MeasuredFields
 from memscal.extensions.arrays.receptive_fields import MARGIN, receptive_fields
 from memscal.model.arrays import (
     ArrayPair,
@@ -96,8 +97,15 @@ class Seeking:
                 why="Receptive fields are calculated under a point, a rod, or a sphere.",
                 cure='Give "point", memscal.Rod(radius=...) or memscal.Sphere(radius=...).',
             )
-        fields = receptive_fields(array, None if isinstance(indenter, str) else indenter)
-        h = array.film.thickness
+        if array.kernel == "measured":
+            # Only presses like those of the scan are known, and no place beyond it.
+            fields: Any = MeasuredFields(array)
+            h = fields.scale
+            margin = 0.0
+            shear = 0.0
+        else:
+            fields = receptive_fields(array, None if isinstance(indenter, str) else indenter)
+            h = array.film.thickness
         told = np.ptp(fields.centres, axis=0) > _ON_A_LINE * h
         told[0] |= not told[1]
         beyond = told * margin * h
@@ -317,7 +325,7 @@ def locate(
         covariance=covariance,
         p_value=p_value,
         flags=tuple(flags),
-        assumed_shear=float(shear),
+        assumed_shear=float(seeking.shear),
         indenter=None if isinstance(indenter, str) else indenter,
         frame=np.arange(len(values)),
         centres=fields.centres,

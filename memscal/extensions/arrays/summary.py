@@ -40,6 +40,8 @@ def _numbers(array: SensorArray) -> Values:
 def answer(result: Any) -> str:
     """Return how many sensors are used, how well A and crosstalk are known, and what failed."""
     array = array_of(result)
+    if array.kernel == "measured":
+        return f"Fields of {len(array.sensors)} sensors as measured: places, without pascals."
     used = array.used
     a = _numbers(array)["conversion_constant"]
     values, errors = np.array([a["value"], a["standard_uncertainty"]], float)[:, used]
@@ -86,6 +88,8 @@ def _crosstalk_text(array: SensorArray) -> str:
 def tables(result: Any) -> list[Table]:
     """Return the sensors, their crosstalk if it is identified, and the checks."""
     array = array_of(result)
+    if array.kernel == "measured":
+        return [checks_table(array.checks)]
     numbers = _numbers(array)
     crosstalk = numbers.pop("crosstalk")
     heads = []

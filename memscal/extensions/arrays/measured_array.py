@@ -1,0 +1,86 @@
+"""An array of sensors whose fields are measured: ``calibrate_array(scan, kernel="measured")``."""
+
+from typing import Any
+
+import numpy as np
+
+from memscal.errors import InputError
+from memscal.extensions.arrays.array_data import ArrayReadings, KernelModes
+from memscal.extensions.arrays.sensor_array import SensorArray
+from memscal.model.arrays import floats
+from memscal.model.provenance import Process
+from memscal.model.scan import Scan
+
+#: Places that differ by less, in m, are one node of the raster.
+_SAME = 1e-6
+
+
+def measured_array(scan: Scan) -> SensorArray:
+    """Return an array by the measured field of each sensor, from a repeated raster of presses.
+
+    Raises
+    ------
+    InputError
+        If the presses are no full raster, or were not repeated.
+    """
+    from scipy.interpolate import RectBivariateSpline
+
+    u = scan.u_zz.reshape(len(scan.sensors), -1)
+    places = [np.round(axis.ravel() / _SAME) * _SAME for axis in scan.positions]
+    (x, i), (y, j) = (np.unique(axis, return_inverse=True) for axis in places)
+    node = i * y.size + j
+    counts = np.bincount(node, minlength=x.size * y.size)
+    if min(x.size, y.size) < 4 or counts.min() == 0 or counts.max() == 1:
+        raise InputError(
+            f"Of {x.size} x {y.size} places {np.sum(counts > 0)} were pressed, one of them "
+            f"{counts.max()} times.",
+            why="The field of each sensor is measured by a full raster, and its error by repeats.",
+            cure="Press each place of a raster, two times or more.",
+        )
+    sums = [np.bincount(node, row, counts.size) for row in u]
+    mean = floats(sums) / counts
+    away = u - mean[:, node]
+    noise = away @ away.T / (u.shape[1] - counts.size)
+    maps = []
+    errors = []
+    for row, variance in zip(mean, np.diag(noise), strict=True):
+        misfit = variance * np.sum(1 / counts)
+        spline = RectBivariateSpline(x, y, row.reshape(x.size, y.size), s=misfit)
+        maps.append(spline(x, y).ravel())
+        errors.append(np.sqrt(variance * spline.get_coeffs().size / u.shape[1]))
+    n = len(u)
+    at_x, at_y = (floats(grid.ravel()) for grid in np.meshgrid(x, y, indexing="ij"))
+    predicted = floats(maps)
+    top = np.abs(predicted).argmax(axis=1)
+    unknown = np.full(n, np.nan)
+    # No film and no rod, where the scan states none.
+    film: Any = scan.film
+    indenter: Any = scan.indenter
+    root = np.zeros((3 * n, 1))
+    root[:n, 0] = errors
+    nothing = np.zeros_like(predicted)
+    return SensorArray(
+        sensors=scan.sensors,
+        used=np.ones(n, bool),
+        conversion_constants=unknown,
+        centres=np.stack([at_x[top], at_y[top]], axis=1),
+        crosstalk=np.eye(n),
+        estimated=np.zeros((n, n), bool),
+        gaussian_sigmas=unknown,
+        baselines=np.zeros(n),
+        noise=noise,
+        k=np.arange(4.0),
+        kernels=np.zeros((1, 4)),
+        modes=KernelModes(np.zeros((0, 4)), np.zeros(0, np.intp)),
+        root=root,
+        effects={},
+        film=film,
+        indenter=indenter,
+        load=1.0,
+        readings=ArrayReadings(at_x, at_y, np.ones(at_x.size), mean, predicted, nothing),
+        kernel="measured",
+        reading_low=scan.reading_low,
+        reading_high=scan.reading_high,
+        reading=scan.reading,
+        process=Process.of_now(input_scan=scan.source),
+    )

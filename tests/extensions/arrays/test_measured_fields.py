@@ -1,0 +1,75 @@
+"""Arrays of measured fields: magnetic dipoles, whose fields change sign, located without a film."""
+
+import numpy as np
+import pytest
+
+import memscal
+
+NAMES = tuple(f"B{i}" for i in range(5))
+PLACES = 1e-3 * np.array([[0, 0], [8, 0], [-8, 0], [0, 8], [0, -8]])
+STEP = 1e-3
+NOISE = 3e-7  # T
+
+
+def fields(at):
+    """Fields of a dipole under each press, in T: positive above it, negative around it."""
+    r = np.linalg.norm(at[:, None] - PLACES, axis=-1) / 7e-3
+    return 1e-4 * (2 - r**2) / (1 + r**2) ** 2.5
+
+
+def raster(rng, repeats=4):
+    axis = STEP * np.arange(-12, 13)
+    x, y = (grid.ravel() for grid in np.meshgrid(axis, axis))
+    at = np.tile(np.stack([x, y], axis=1), (repeats, 1))
+    u = fields(at) + NOISE * rng.normal(size=(len(at), 5))
+    repeat = np.repeat(np.arange(repeats), x.size)
+    return memscal.Scan(sensors=NAMES, x=at[:, 0], y=at[:, 1], u_zz=u.T, repeat=repeat, unit="T")
+
+
+@pytest.fixture
+def rng(seed):
+    return np.random.default_rng(seed)
+
+
+@pytest.fixture
+def array(rng):
+    return memscal.calibrate_array(raster(rng), kernel="measured").array
+
+
+def test_fields_that_change_sign_place_presses_of_other_sizes(array, rng):
+    places = rng.uniform(-10e-3, 10e-3, (300, 2))
+    sizes = rng.uniform(0.5, 2.0, 300)
+    u = sizes[:, None] * fields(places) + NOISE * rng.normal(size=(300, 5))
+    found = array.locate(u)
+    error = np.stack([found.x, found.y, found.force], axis=1) - np.column_stack([places, sizes])
+    z = error / found.uncertainties
+    assert np.median(np.hypot(*error[:, :2].T)) < 0.3e-3
+    # Of a normal distribution half of all lie within 0.67; of 300 this is known to 0.06.
+    assert np.all(abs(np.median(abs(z), axis=0) - 0.674) < 0.25)
+    assert found.unit == "1"
+    assert "presses like those of the scan" in found.answer()
+
+
+def test_the_maps_are_smoother_than_the_readings(array):
+    readings = array.readings
+    true = fields(np.stack([readings.x, readings.y], axis=1)).T
+    smoothed = np.sqrt(np.mean((readings.predicted - true) ** 2))
+    assert smoothed < 0.8 * np.sqrt(np.mean((readings.u - true) ** 2))
+    # What is stated of the maps is their error.
+    assert smoothed == pytest.approx(np.mean(array.root[:5]), rel=0.5)
+
+
+def test_such_an_array_is_kept_in_a_file_and_drawn(array, tmp_path):
+    array.save(tmp_path / "skin.h5")
+    again = memscal.load_array(tmp_path / "skin.h5")
+    np.testing.assert_allclose(again.readings.predicted, array.readings.predicted)
+    assert again.film is None
+    u = fields(np.array([[2e-3, 1e-3]]))
+    np.testing.assert_allclose(again.locate(u).x, array.locate(u).x)
+    assert len(array.plot().axes) == 6
+    assert "5 sensors" in str(array)
+
+
+def test_a_raster_without_repeats_is_refused(rng):
+    with pytest.raises(memscal.MemscalError, match="two times"):
+        memscal.calibrate_array(raster(rng, repeats=1), kernel="measured")
