@@ -58,8 +58,8 @@ def test_the_words_that_types_name_are_those_there_are():
 
 
 def test_arrays_take_what_the_records_of_a_table_hold():
-    # Sheets, separators and rows to skip are of files.
-    of_files = {"sheet", "scan", "skip_rows", "missing", "delimiter", "decimal"}
+    # Sheets, separators and rows to skip are of files, a layout of several columns.
+    of_files = {"layout", "sheet", "scan", "skip_rows", "missing", "delimiter", "decimal"}
     records = (memscal.TableLayout, memscal.ScanConditions, memscal.ScanUncertainties)
     held = {name for record in records for name in record.__dataclass_fields__}
     taken = memscal.model.scan.ArrayOptions.__annotations__

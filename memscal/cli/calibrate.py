@@ -295,13 +295,15 @@ def command(
 
     A failed quality check is exit code 1: the artifact is written and states it.
     """
-    code: int | None = hook("calibrated_array")(click.get_current_context())
-    if code is not None:
+    if _is_array(scans[0]):
+        code: int = hook("calibrate_array_file")(click.get_current_context())
         return code
+    of_array = (settings.pop("kernel"), settings.pop("crosstalk"))
+    if any(of_array):
+        raise click.UsageError("--kernel and --crosstalk belong to the scan of an array.")
     channel = settings["channel"]
     ending = ".apparatus.h5" if channel == "zz" else f".{channel}.apparatus.h5"
     output = output or out.default_name(scans[0], ending)
-    del settings["kernel"], settings["crosstalk"]  # of an array
     settings = calibration_settings(reference=reference, alternative=alternative, **settings)
     data = _read(scans, reference, noise_record, settings)
     outputs = list(filter(None, (output, report, *figures, sweep_figure)))
@@ -333,6 +335,13 @@ def command(
     out.say_written(outputs)
     then = f" {output.name} was written and is marked so."
     return exit_code_of(apparatus.checks, then=then)
+
+
+def _is_array(path: Path) -> bool:
+    from memscal.formats.hdf5.reader import open_hdf5
+
+    with open_hdf5(path) as file:
+        return file.has("/entry/data/sensor_names")
 
 
 def _read(

@@ -92,7 +92,7 @@ VIEWS = {
 
 HOOKS = {
     "add_up": "extensions.arrays.import_array",
-    "calibrated_array": "extensions.arrays.calibrate_command",
+    "calibrate_array_file": "extensions.arrays.calibrate_command",
     "array_scan": "extensions.arrays.import_array",
     "columns_of_array": "extensions.arrays.import_array",
     "drawn_as": "figures.style",

@@ -530,8 +530,8 @@ class Scan:
         names = tuple(map(str, self.sensors))
         number = len(names)
         u_zz = frozen_array(self.u_zz)
-        different = len({*names, ""}) == number + 1 and not isinstance(self.sensors, str)
-        if not different or u_zz.shape[:1] != (number,) or self.channels:
+        alike = len({*names, ""}) <= number
+        if alike or u_zz.shape[:1] != (number,) or self.channels:
             raise InputError(
                 f"The sensors of the scan are {self.sensors!r}, u_zz has shape {u_zz.shape}, and "
                 f"further channels are: {', '.join(self.channels) or 'none'}.",
@@ -555,8 +555,8 @@ class Scan:
                     why=f"There are {number} sensors.",
                     cure="Give finite values of that shape, or leave it out.",
                 )
-            further = [1] * (len(shape) - values.ndim)
-            own[name] = np.broadcast_to(values.reshape(*values.shape, *further), shape)
+            # By its first axes, not by its last ones: one value for each sensor, or for all.
+            own[name] = np.broadcast_to(values.T, shape[::-1]).T
         vars(self).update(own)
         first, *_ = [self.of_sensor(i) for i in range(number)]
         vars(self).update(vars(first) | own)

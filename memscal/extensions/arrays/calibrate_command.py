@@ -9,32 +9,25 @@ from memscal.cli import output as out
 from memscal.cli.failures import exit_code_of
 from memscal.cli.options import LAW
 from memscal.formats.files import together
-from memscal.formats.hdf5.reader import open_hdf5
 
-#: Options that an array alone has, those of its calibration, and those of what is written.
-_OWN = ("kernel", "crosstalk")
-_TAKEN = (*_OWN, "reference", *LAW, "rod_friction", "override", "accept_altered")
+#: Options that the calibration of an array takes, and those of what is written.
+_TAKEN = ("kernel", "crosstalk", "reference", *LAW, "rod_friction", "override", "accept_altered")
 _WRITTEN = ("scans", "output", "as_json", "report", "figures", "force")
 
 
-def calibrated_array(context: click.Context) -> int | None:
-    """Calibrate the array of a command's scan; return the exit code, None of a single sensor."""
+def calibrate_array_file(context: click.Context) -> int:
+    """Calibrate the array of a command's scan, and return the exit code."""
     asked = context.params
     scan: Path = asked["scans"][0]
-    with open_hdf5(scan) as file:
-        single = not file.has("/entry/data/sensor_names")
-    given = {
-        parameter.name: parameter.opts[-1]
+    useless = [
+        parameter.opts[-1]
         for parameter in context.command.params
         if context.get_parameter_source(str(parameter.name)) is ParameterSource.COMMANDLINE
-    }
-    allowed = given.keys() - _OWN if single else {*_TAKEN, *_WRITTEN}
-    useless = [option for name, option in given.items() if name not in allowed]
+        and parameter.name not in (*_TAKEN, *_WRITTEN)
+    ]
     if useless:
-        kind = "a single sensor" if single else "an array of sensors"
-        raise click.UsageError(f"The scan of {kind} has no use for {', '.join(useless)}.")
-    if single:
-        return None
+        problem = f"The scan of an array of sensors has no use for {', '.join(useless)}."
+        raise click.UsageError(problem)
     if len(asked["scans"]) > 1:
         raise click.UsageError("An array is calibrated from one scan.")
     force = asked["force"]

@@ -43,7 +43,7 @@ def test_an_array_is_told_by_its_scan_and_its_options_are_handed_on(asked, run):
         ("scan.h5 --method tikhonov --sweep", "has no use for --method, --sweep"),
         ("scan.h5 --monte-carlo 5 --dry-run", "array of sensors has no use for --monte-carlo"),
         ("scan.h5 single.h5", "one scan"),
-        ("single.h5 --kernel own", "single sensor has no use for --kernel"),
+        ("single.h5 --kernel own", "--kernel and --crosstalk belong to"),
     ],
 )
 def test_options_of_the_other_kind_are_refused_by_name(asked, run, words, refused):
