@@ -295,11 +295,14 @@ def command(
 
     A failed quality check is exit code 1: the artifact is written and states it.
     """
-    if _is_array(scans[0]):
+    from memscal.formats.hdf5.reader import open_hdf5
+
+    with open_hdf5(scans[0]) as file:
+        array = file.has("/entry/data/sensor_names")
+    if array:
         code: int = hook("calibrate_array_file")(click.get_current_context())
         return code
-    of_array = (settings.pop("kernel"), settings.pop("crosstalk"))
-    if any(of_array):
+    if settings.pop("kernel") or settings.pop("crosstalk"):
         raise click.UsageError("--kernel and --crosstalk belong to the scan of an array.")
     channel = settings["channel"]
     ending = ".apparatus.h5" if channel == "zz" else f".{channel}.apparatus.h5"
@@ -335,13 +338,6 @@ def command(
     out.say_written(outputs)
     then = f" {output.name} was written and is marked so."
     return exit_code_of(apparatus.checks, then=then)
-
-
-def _is_array(path: Path) -> bool:
-    from memscal.formats.hdf5.reader import open_hdf5
-
-    with open_hdf5(path) as file:
-        return file.has("/entry/data/sensor_names")
 
 
 def _read(

@@ -508,11 +508,10 @@ def _example(table: Path, missing: Sequence[str], options: Options) -> str:
     if len(free) < len(missing):
         return "See the examples of `memscal import --help`."
     line = ["memscal", "import", str(table)]
-    for name in ("x", "u"):
-        if options[name] or name in missing:
-            given = options[name] or free.pop(0)
-            for column in [given] if isinstance(given, str) else given:
-                line += [f"--{name}", column]
+    if options["x"] or "x" in missing:
+        line += ["--x", options["x"] or free.pop(0)]
+    for column in options["u"] or [free.pop(0)]:
+        line += ["--u", column]
     return (
         f"The columns of {table.name} are {', '.join(columns[:_NAMED])}. For instance: "
         f"{shlex.join([*line, '-o', f'{table.stem}.h5'])}"

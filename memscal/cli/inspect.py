@@ -49,9 +49,9 @@ def _tables(contents: Item) -> Iterator[Table]:
     rows += [(name, contents[name]) for name in named]
     yield Table(contents["file"], ("", ""), rows)
 
-    sensors = contents.get("sensors", ())
-    places = [(item["name"], *map(_number, item["place"])) for item in sensors]
-    yield Table(f"Array of {len(places)} sensors", ("sensor", "x (mm)", "y (mm)"), places)
+    layout = contents.get("layout", ())
+    places = [(item["name"], *map(_number, item["place"])) for item in layout]
+    yield Table(f"Layout of {len(places)} sensors", ("sensor", "x (mm)", "y (mm)"), places)
     quantities = [(_words(item), _value(item), item["path"]) for item in contents["quantities"]]
     title = "Quantities (± standard uncertainty, k = 1)"
     yield Table(title, ("quantity", "value", "path"), quantities)

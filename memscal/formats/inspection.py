@@ -114,7 +114,7 @@ def describe(path: FilePath, *, accept_altered: bool = False) -> Values:
                     provenance.append((place, quantity))
                 elif quantity.axes and file.array(place).ndim:
                     arrays.append(_array_row(file, place))
-                elif value == place and quantity.dimension != "names":
+                elif value == place:
                     quantities.append(_quantity_row(file, place))
                 elif quantity.of is not None and value not in [q["path"] for q in quantities]:
                     quantities.append(_quantity_row(file, value if file.has(value) else place))
@@ -136,7 +136,7 @@ def describe(path: FilePath, *, accept_altered: bool = False) -> Values:
             "schema": schema,
             "schema_version": version,
             "title": file.optional_text("/entry/title"),
-            **_sensors(held),
+            **_layout_of(held),
             "quantities": quantities,
             "arrays": arrays,
             "checks": checks,
@@ -220,14 +220,13 @@ def _quantity_row(file: SafeFile, path: str) -> Values:
     }
 
 
-def _sensors(held: Any) -> Values:
-    """Return the sensors of an array with their places by design, in mm, where they are stated."""
-    names = getattr(held, "sensors", ())
+def _layout_of(held: Any) -> Values:
+    """Return the places of the sensors of an array by design, in mm, where they are stated."""
     layout = getattr(held, "layout", None)
-    places = [(None, None)] * len(names) if layout is None else (1e3 * layout).tolist()
-    pairs = zip(names, places, strict=True)
-    sensors = [{"name": name, "place": place, "unit": "mm"} for name, place in pairs]
-    return {"sensors": sensors} if sensors else {}
+    if layout is None:
+        return {}
+    pairs = zip(held.sensors, (1e3 * layout).tolist(), strict=True)
+    return {"layout": [{"name": name, "place": place, "unit": "mm"} for name, place in pairs]}
 
 
 def _uncertainty(file: SafeFile, path: str) -> float | int | None:

@@ -674,13 +674,9 @@ class Scan:
                 f"The direction of the scan is {self.direction!r}.",
                 cure="A line scan runs along 'x' or 'y'; a raster has its own y.",
             )
-        for name in STATED_ERRORS:
-            require_non_negative(
-                f"{name.replace('_', ' ')} uncertainty of the scan",
-                getattr(self, f"{name}_uncertainty"),
-            )
-        require_non_negative("averaging length of the scan", self.averaging_length)
-        require_non_negative("dwell time of the scan", self.dwell_time)
+        stated = [f"{name}_uncertainty" for name in ("load", *STATED_ERRORS)]
+        for name in (*stated, "averaging_length", "dwell_time"):
+            require_non_negative(f"{name.replace('_', ' ')} of the scan", getattr(self, name))
         record = self.noise_record
         if record is not None and getattr(record, "motion", "") != "rest":
             raise InputError(
@@ -688,7 +684,6 @@ class Scan:
                 cure="Give readings at rest, as read_scan() returns them (motion='rest').",
             )
         require_rod_friction(self.rod_friction)
-        require_non_negative("standard uncertainty of the load", self.load_uncertainty)
         if self.normal_load_errors is not None and self.normal_load is None:
             raise InputError(
                 "normal_load_errors is given without normal_load.",

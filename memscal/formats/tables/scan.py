@@ -430,8 +430,8 @@ def _scan_of(
     if "y" not in columns and "normal_load" in columns:
         messages += _mixed_loads(columns["normal_load"], columns.get("repeat"), conditions.indenter)
     columns = _as_rows(columns)
-    further = [name for name in columns if name.startswith("u_") and name not in _NORMAL]
-    channels: Columns = {name: columns.pop(name) for name in further}
+    further = [name for name in columns if name.startswith("u_")]
+    channels: Columns = {name: columns.pop(name) for name in further if name not in _NORMAL}
     if load_scatter is not None:
         columns["normal_load_errors"] = load_scatter * columns["normal_load"]
     if x_error is not None:
