@@ -32,7 +32,6 @@ _DECLARED = by_name(records.SCAN_DATA.quantities)
 _OWN_SHAPE = {"x", "y", "x_errors", "y_errors", "u_zz_correlation"}
 _AS_SIGNAL = _DECLARED.keys() - _OWN_SHAPE
 _POINTS = ("point",)
-_SENSOR = ("sensor",)
 #: Fields of a layout, and how the names end of what its two columns are in files.
 _LAYOUTS = (("layout", ""), ("layout_uncertainty", "_errors"))
 _PAIRS = ("point", "point_prime")
@@ -261,7 +260,7 @@ def _data_group(scan: Scan) -> Group:
         data |= _nodes(scan, _PAIRS, u_zz_correlation=scan.u_zz_correlation)
     like_signal = {name: getattr(scan, name) for name in LIKE_SIGNAL}
     data |= _nodes(scan, axes, **like_signal, **scan.channels)
-    axes = (*_SENSOR, *axes)[-scan.u_zz.ndim :]
+    axes = ("sensor", *axes)[-scan.u_zz.ndim :]
     return Group("NXdata", data, {"signal": "u_zz", "axes": axes})
 
 
@@ -276,7 +275,7 @@ def _nodes(scan: Scan, axes: tuple[str, ...], **arrays: FloatArray | None) -> No
         name: si(
             array,
             _DECLARED[name].read_in(scan.reading).dimension,
-            (*_SENSOR, *axes)[-array.ndim :],
+            ("sensor", *axes)[-array.ndim :],
         )
         for name, array in arrays.items()
         if array is not None
@@ -293,7 +292,7 @@ def _find_axes(file: SafeFile) -> tuple[str, ...] | None:
         form = present if len(present) == 2 else ("repeat", *present)
         forms = [form] if several else [form, form[::-1]]
     if several:
-        forms = [(*_SENSOR, *form) for form in forms]
+        forms = [("sensor", *form) for form in forms]
     stated = set(_stated_axes(file, len(shape)))
     fitting = [form for form in forms if stated.issubset(enumerate(form))]
     if not fitting:

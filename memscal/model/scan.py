@@ -674,8 +674,8 @@ class Scan:
                 f"The direction of the scan is {self.direction!r}.",
                 cure="A line scan runs along 'x' or 'y'; a raster has its own y.",
             )
-        stated = [f"{name}_uncertainty" for name in ("load", *STATED_ERRORS)]
-        for name in (*stated, "averaging_length", "dwell_time"):
+        errors = [f"{name}_uncertainty" for name in ("load", *STATED_ERRORS)]
+        for name in (*errors, "averaging_length", "dwell_time"):
             require_non_negative(f"{name.replace('_', ' ')} of the scan", getattr(self, name))
         record = self.noise_record
         if record is not None and getattr(record, "motion", "") != "rest":

@@ -43,7 +43,7 @@ def test_a_line_that_is_repeated_once_is_still_repeats():
         ("line", {"u_zz": np.full(33, np.inf)}, "infinite voltage"),
         ("line", {"u_zz_errors": np.full(33, -1e-6)}, "negative or infinite"),
         ("line", {"load": 0.0}, "load of the scan is 0 N"),
-        ("line", {"load_uncertainty": -0.01}, "standard uncertainty of the load"),
+        ("line", {"load_uncertainty": -0.01}, "load uncertainty of the scan"),
         ("line", {"branch": [1, 2]}, r"branch has shape \(2,\)"),
         ("line", {"branch": np.full(33, 3)}, "branch of the scan holds 3,"),
         ("repeats", {"branch": ["approach", "retreat", "up"]}, "branch of the scan holds up,"),

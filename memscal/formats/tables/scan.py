@@ -46,8 +46,6 @@ _RECORDS = {"layout": TableLayout, "conditions": ScanConditions, "uncertainties"
 _READING = ("sheet", "scan", "skip_rows", "missing", "delimiter", "decimal")
 #: Options that name columns, besides x and u.
 ARRAYS = ("y", "repeat", "branch", "u_errors", "load_column", "depth", "u_xz", "u_yz", "time")
-#: Readings that are no further channel.
-_NORMAL = ("u_zz", "u_zz_errors")
 #: Words of a column that tells when the indenter presses.
 _PRESSING = {"false": 0.0, "true": 1.0}
 #: Positions closer than this share of the typical spacing are probably one place, and a table with
@@ -430,8 +428,9 @@ def _scan_of(
     if "y" not in columns and "normal_load" in columns:
         messages += _mixed_loads(columns["normal_load"], columns.get("repeat"), conditions.indenter)
     columns = _as_rows(columns)
-    further = [name for name in columns if name.startswith("u_")]
-    channels: Columns = {name: columns.pop(name) for name in further if name not in _NORMAL}
+    normal = ("u_zz", "u_zz_errors")
+    further = [name for name in columns if name.startswith("u_") and name not in normal]
+    channels: Columns = {name: columns.pop(name) for name in further}
     if load_scatter is not None:
         columns["normal_load_errors"] = load_scatter * columns["normal_load"]
     if x_error is not None:
