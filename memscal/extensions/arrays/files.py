@@ -6,6 +6,7 @@ The records of its groups stand in ``files.toml``.
 import tomllib
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -20,7 +21,6 @@ from memscal.formats.hdf5.writer import ARRAY_SCHEMA, Group, Nodes, file_tree, t
 from memscal.formats.units import reading_of
 from memscal.model import records
 from memscal.model.arrays import Values
-from memscal.model.film import ElasticFilm
 from memscal.model.quantities import Quantity, Record, record
 
 _U_ZZ = "/entry/reconvolution/u_zz"
@@ -41,14 +41,12 @@ _PARTS = ("of_ln_a", "of_x", "of_y", "of_c", "of_mode")
 def write_array(data: ArrayData, path: FilePath, *, overwrite: bool = False) -> None:
     """Write an array as a memscal-array file; the same data, the same bytes."""
     stated = stated_in_file(data)
-    # An array of measured fields may have none.
-    film: ElasticFilm | None = data.film
-    sample: Nodes = {"film": write_record(records.FILM, film)} if film else {}
+    of_film: Any = data
     children: Nodes = {
         "title": f"Array of {len(data.sensors)} sensors",
         **{name: write_record(of.read_in(data.reading), stated) for name, of in RECORDS.items()},
         "quality": groups.quality_group(data.checks),
-        "sample": Group("NXsample", {**sample, "depends_on": "."}),
+        "sample": groups.sample_group(of_film),
         "indenter": groups.indenter_group(data.indenter, data),
         "process": write_record(records.PROCESS, data.process),
     }
