@@ -20,7 +20,6 @@ from operator import attrgetter
 from typing import Any
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
 
 from memscal.axisymmetry.hankel import RadialSpectrum
 from memscal.axisymmetry.kernels import gaussian_transfer, gaussian_transfer_slope
@@ -134,36 +133,28 @@ def parameters_of(layout: Layout, state: ArrayState) -> FloatArray:
     return values
 
 
-class Normal:
-    """Normal equations with a prior, solved."""
+@array_record
+class Solved:
+    """Normal equations of the parameters, solved."""
 
-    def __init__(self, matrix: FloatArray) -> None:
-        diagonal = np.diag(matrix)
-        if not np.all(diagonal > 0):
-            raise _undetermined()
-        self._scale = diagonal**-0.5
+    root: FloatArray  # (p, p): of the inverse, which is the covariance
+    log_determinant: float
+
+    @classmethod
+    def of(cls, matrix: FloatArray) -> Solved:
+        """Invert normal equations, scaled to a diagonal of ones; refuse those of no solution."""
+        with np.errstate(divide="ignore"):
+            scale = np.diag(matrix) ** -0.5
         try:
-            self._factor = cho_factor(self._scale[:, None] * matrix * self._scale)
+            inverse = np.linalg.inv(matrix * np.outer(scale, scale))
+            root = scale[:, None] * np.linalg.cholesky(inverse)
         except np.linalg.LinAlgError:
-            raise _undetermined() from None
-
-    def solve(self, right: FloatArray) -> FloatArray:
-        """Return the solution for right-hand sides (p,) or (p, n)."""
-        scaled = cho_solve(self._factor, (right.T * self._scale).T)
-        return (scaled.T * self._scale).T
-
-    @property
-    def log_determinant(self) -> float:
-        """Logarithm of the determinant."""
-        diagonal = np.diag(self._factor[0])
-        return float(2 * (np.log(diagonal) - np.log(self._scale)).sum())
-
-
-def _undetermined() -> FitError:
-    return FitError(
-        "The scan does not determine the array: a sensor has too few readings about its centre.",
-        cure="Scan past every sensor, or leave the sensor out (used).",
-    )
+            raise FitError(
+                "The scan does not determine the array: a sensor has too few readings about its "
+                "centre.",
+                cure="Scan past every sensor, or leave the sensor out (used).",
+            ) from None
+        return cls(root, float(-2 * np.log(np.diag(root)).sum()))
 
 
 def noise_of(model: JointModel, state: ArrayState) -> Noise:
@@ -249,7 +240,7 @@ class Weighed:
     """Shapes of the common G, weighed where what is each sensor's own is integrated out."""
 
     log_evidence: float
-    normal: Normal  # of the parameters
+    solved: Solved
     by_others: FloatArray  # (p, 1 + f): the parameters by data and kernels
     columns: FloatArray  # (r, 1 + f): data and kernels that are left
     mix: FloatArray
@@ -265,7 +256,7 @@ class Weighed:
         by_kernel = self.by_others[:, 1:] @ (self.mix @ kernels)
         of_kernel = square_root(weighed.covariance, np.diag(weighed.covariance))
         count = len(by_kernel)
-        of_own = np.linalg.cholesky(self.normal.solve(np.eye(count)))
+        of_own = self.solved.root
         none = np.zeros((len(kernels), count))
         root = np.block([[of_own, -by_kernel @ of_kernel], [none, kernels @ of_kernel]])
         kernel_gain = weighed.gain.dense() @ self.columns[:, 1:]
@@ -295,18 +286,18 @@ def weighed_by(
     gram[own, 0] -= precision @ values
     gram[0, own] = gram[own, 0]
     gram[0, 0] += values @ precision @ values
-    normal = Normal(gram[own, own])
+    solved = Solved.of(gram[own, own])
     others = information.others
-    by_others = normal.solve(gram[own][:, others])
+    by_others = solved.root @ (solved.root.T @ gram[own][:, others])
     columns = _root_of(gram[np.ix_(others, others)] - gram[own][:, others].T @ by_others)
     reduced = _reduced(columns, model.waves, gaussian, forward)
     basis = departure_basis(gaussian, reduced)
     count = information.readings - model.layout.count
     weighing = bayesian.weigh_departures(reduced, basis, count, least_noise=1.0)
     stated = np.diag(precision) > 0
-    volume = np.linalg.slogdet(precision[np.ix_(stated, stated)])[1] - normal.log_determinant
+    volume = np.linalg.slogdet(precision[np.ix_(stated, stated)])[1] - solved.log_determinant
     evidence = float(weighing.evidence + 0.5 * volume)
-    return Weighed(evidence, normal, by_others, columns, model.waves.mix, weighing)
+    return Weighed(evidence, solved, by_others, columns, model.waves.mix, weighing)
 
 
 def _root_of(gram: FloatArray) -> FloatArray:
