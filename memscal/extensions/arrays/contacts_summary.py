@@ -2,7 +2,6 @@
 
 import csv
 import io
-from collections import Counter
 
 import numpy as np
 
@@ -57,19 +56,13 @@ def answer(contacts: Contacts) -> str:
         lines.append(
             f"Median standard uncertainties: {', '.join(known)}, {percent(force)} of force."
         )
-    flags = Counter("; ".join(filter(None, contacts.flags)).split("; "))
-    if any(contacts.flags):
-        said = [f"{flag} {number}" for flag, number in flags.most_common()]
-        lines.append(f"Frames with flags: {', '.join(said)}.")
     return "\n".join([*lines, contacts.assumed])
 
 
 def tables(contacts: Contacts) -> list[Table]:
     """Return the first frames, with standard uncertainties."""
     heads, rows = _cells(contacts, _SHORT)
-    title = f"Contacts, the first {_PRINTED} of {len(rows)} frames"
-    if len(rows) <= _PRINTED:
-        title = "Contacts"
+    title = f"Contacts, up to {_PRINTED} of {counted(len(rows), 'frames')}"
     return [Table(title, heads[:_COLUMNS], [row[:_COLUMNS] for row in rows[:_PRINTED]])]
 
 

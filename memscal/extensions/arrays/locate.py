@@ -66,8 +66,9 @@ _ON_A_LINE = 0.1
 #: by which starts are compared: by little noise a huge force far outside is as likely as a contact.
 _OUTSIDE = 0.5
 _FORCES = 1.5
-#: A force is at least this share of that at the best start.
-_LEAST = 1e-3
+#: Forces are above this, in N; what is fixed has this standard deviation, in SI units.
+_LEAST = 1e-9
+_FIXED = 1e-12
 #: A force of a larger relative uncertainty is weak.
 _WEAK = 0.2
 
@@ -77,10 +78,10 @@ Touch = str | RoundIndenter
 
 @array_record
 class Seeking:
-    """How contacts are sought: fields, the parameters that are free, and the region in m."""
+    """How contacts are sought: fields, which of x and y they tell, and the region in m."""
 
     fields: Any  # ReceptiveFields, or MeasuredFields
-    free: list[int]  # of x, y, force and the two shears
+    axes: list[int]  # which of x and y the sensors tell; the other one is that of the row
     shear: float
     low: FloatArray  # (2,)
     high: FloatArray
@@ -111,18 +112,13 @@ class Seeking:
         beyond = told * margin * h
         return cls(
             fields=fields,
-            free=np.flatnonzero([*told, True, *(told & (shear > 0))]).tolist(),
+            axes=np.flatnonzero(told).tolist(),
             shear=shear,
             low=fields.centres.min(axis=0) - beyond,
             high=fields.centres.max(axis=0) + beyond,
             thickness=h,
             near=_OUTSIDE * h,
         )
-
-    @property
-    def axes(self) -> list[int]:
-        """Which of x and y the sensors tell."""
-        return [i for i in self.free if i < 2]
 
     def grid(self, step: float = _STEP) -> FloatArray:
         """Places on which contacts are sought first, so many thicknesses apart, (g, 2), in m."""
@@ -180,26 +176,24 @@ class Sight:
         state[:, 2] = 1.0
         fields = u - self.rows(u, state)[0][:, : u.shape[1]]
         force = np.sum(fields * u, axis=1) / np.sum(fields**2, axis=1)
-        least = _LEAST * np.repeat(force.reshape(-1, several).max(axis=1), several)
-        state[:, 2] = np.maximum(force, least)
-        cost = self._settle(u, state, least)
+        state[:, 2] = np.maximum(force, _LEAST)
+        cost = self._settle(u, state)
         # Of contacts that are as likely the one of a more usual force is taken.
         cost += (np.log(state[:, 2] / self.seeking.fields.array.load) / _FORCES) ** 2
         best = cost.reshape(-1, several).argmin(axis=1)
         return floats(state.reshape(-1, several, 5)[np.arange(best.size), best])
 
-    def _settle(self, u: FloatArray, state: FloatArray, least: FloatArray) -> FloatArray:
+    def _settle(self, u: FloatArray, state: FloatArray) -> FloatArray:
         """Move states (m, 5) to their least chi-square by damped Gauss-Newton steps; return it."""
-        free = self.seeking.free
         damping = np.full(len(state), _DAMPING)
         residual, slopes = self.rows(u, state)
         cost = np.sum(residual**2, axis=1)
         active = np.arange(len(state))
         for _ in range(_STEPS):
-            trial = state[active]
-            trial[:, free] += steps(residual[active], slopes[active], damping[active])[0]
+            step, _ = steps(residual[active], slopes[active], damping[active])
+            trial = state[active] + step
             trial[:, :2] = np.clip(trial[:, :2], self.seeking.low, self.seeking.high)
-            trial[:, 2] = np.maximum(trial[:, 2], least[active])
+            trial[:, 2] = np.maximum(trial[:, 2], _LEAST)
             there, bent = self.rows(u[active], trial)
             fall = cost[active] - np.sum(there**2, axis=1)
             better = fall >= 0
@@ -225,8 +219,7 @@ class Sight:
         both[:, :s] = np.linalg.solve(root, both[:, :s])
         residual, slopes = both[..., 0], both[..., 1:]
         step, inverse = steps(residual, slopes, np.zeros(len(u)))
-        moved = state.copy()
-        moved[:, self.seeking.free] += step
+        moved = state + step
         moved[:, :2] = np.clip(moved[:, :2], self.seeking.low, self.seeking.high)
         square = np.sum(residual**2, axis=1) - np.einsum("mrf,mr,mf->m", slopes, residual, step)
         freedom = s - len(self.seeking.axes) - 1
@@ -234,11 +227,11 @@ class Sight:
         return moved, self.covariance(inverse), floats(p_value)
 
     def covariance(self, inverse: FloatArray) -> FloatArray:
-        """Return covariances (m, 3, 3) of x, y and force from those of the free parameters."""
-        told = [i for i in self.seeking.free if i < 3]
-        covariance = np.full((len(inverse), 3, 3), np.nan)
-        of_told = inverse[:, : len(told), : len(told)]
-        covariance[np.ix_(range(len(inverse)), told, told)] = of_told
+        """Return covariances (m, 3, 3) of x, y and force; NaN where the sensors do not tell."""
+        untold = [i for i in (0, 1) if i not in self.seeking.axes]
+        covariance = inverse[:, :3, :3].copy()
+        covariance[:, untold] = np.nan
+        covariance[:, :, untold] = np.nan
         return covariance
 
     def rows(self, u: FloatArray, state: FloatArray) -> ArrayPair:
@@ -249,13 +242,13 @@ class Sight:
         seeking = self.seeking
         value, slopes = seeking.fields.forward(*_parts(state))
         away = np.column_stack([seeking.beyond(state[:, :2]), state[:, 3:]])
-        shear = seeking.shear or np.inf
-        weight = np.where(away, np.array([1 / seeking.near] * 2 + [1 / shear] * 2), 0.0)
-        weight[:, 2:] = 1 / shear
+        weight = np.full(away.shape, 1 / max(seeking.shear, _FIXED))
+        weight[:, :2] = np.where(away[:, :2], 1 / seeking.near, 0.0)
+        weight[:, [i for i in (0, 1) if i not in seeking.axes]] = 1 / _FIXED
         read = u - value[:, self.kept] @ self.whitener.T
         prior = weight[..., None] * np.eye(5)[[0, 1, 3, 4]]
         slopes = np.concatenate([self.whitener @ slopes[:, self.kept], prior], axis=1)
-        return np.concatenate([read, -weight * away], axis=1), slopes[..., seeking.free]
+        return np.concatenate([read, -weight * away], axis=1), slopes
 
 
 def steps(residual: FloatArray, slopes: FloatArray, damping: FloatArray) -> ArrayPair:

@@ -73,10 +73,7 @@ class ReceptiveFields:
     owner: IndexArray
     sizes: FloatArray  # (changes, c)
 
-    @property
-    def unit(self) -> str:
-        """Unit of the forces."""
-        return "N"
+    unit = "N"
 
     def radius(self, force: FloatArray) -> FloatArray:
         """Contact radii (m) under forces."""
