@@ -62,8 +62,7 @@ def array_scan(
     stated: Values = {} if layout is None else read_layout(layout, names)
     if ceiling is not None:  # a calibration leaves out what is there, and says of which sensor
         stated["reading_high"] = to_si(ceiling, of.unit, of.dimension, "ceiling (--ceiling)")
-    stated["u_zz_errors"] = None  # those of holds are those of the sum
-    if scan.u_zz_errors is not None and scan.holds is None:
+    if scan.u_zz_errors is not None:
         stated["u_zz_errors"] = np.broadcast_to(scan.u_zz_errors, u_zz.shape)
     array = replace(scan, u_zz=u_zz, channels=channels, sensors=tuple(names), **stated)
     most = int(np.nan_to_num(u_zz).argmax()) // scan.u_zz.size

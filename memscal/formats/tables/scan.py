@@ -178,10 +178,9 @@ def import_table(
     asked = named | {f"reading {i}": column for i, column in enumerate(readings)}
     table = open_table(source, asked, **{name: getattr(layout, name) for name in _READING})
     named |= table.defaults
-    several = len(readings) > 1 or "*" in str(u)
-    of_array = hook("columns_of_array")(table, readings) if several else {}
-    array = len(of_array) > 1
-    named |= of_array
+    if len(readings) > 1 or "*" in str(u):
+        named |= hook("columns_of_array")(table, readings)
+    array = any(" of " in name for name in named)
     _require_use(named, layout, conditions, uncertainties)
     wanted, reading = _wanted(table, named, layout)
     columns, notes = _read_columns(table, wanted, layout.u_sign, uncertainties.noise)
@@ -203,7 +202,8 @@ def import_table(
             hook("require_all_held")(holds, presses)
         notes += holds.notes
         columns = dict(holds.mean)
-        if holds.u_errors.all():  # readings of few digits may not scatter
+        # Readings of few digits may not scatter; the sum of an array scatters as no sensor does.
+        if holds.u_errors.all() and not array:
             columns["u_zz_errors"] = holds.u_errors
     of = wanted["u_zz"]
     ceiling = None if array else layout.ceiling
