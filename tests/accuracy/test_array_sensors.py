@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from helpers.bounds import FULL, root_mean_square, root_mean_square_limit
-from helpers.true_arrays import simulated_scan
+from helpers.true_arrays import KERNELS, simulated_scan
 
 import memscal
 
@@ -19,8 +19,16 @@ LOAD = 1.0
 X = 0.25e-3 * np.arange(-33, 34)
 
 
+def nearest_width(kernel):
+    """Return the width of the Gaussian nearest to a G in the plane, from a table of widths."""
+    k = np.linspace(0.0, 10e3, 2001)
+    widths = np.linspace(0.4e-3, 0.8e-3, 4001)
+    misfits = [np.sum(k * (KERNELS[kernel](k) - np.exp(-((w * k) ** 2) / 2)) ** 2) for w in widths]
+    return widths[np.argmin(misfits)]
+
+
 def errors_over_uncertainties(kernel, seed):
-    """Return those of A, of the measured force and of the restored stress on the axis."""
+    """Return those of A, sigma, the measured force and the restored stress on the axis."""
     scan, true = simulated_scan(1, 5, seed=seed, kernel=kernel)
     sensor = memscal.calibrate_array(scan).array.sensor("T02")
     a = true.conversion_constants[2]
@@ -44,6 +52,8 @@ def errors_over_uncertainties(kernel, seed):
     on_axis = bare.readings(np.zeros((1, 2)), LOAD, indenter=SPHERE)[0, 0]
     return [
         (sensor.conversion_constant - a) / sensor.parameters.uncertainty("conversion_constant"),
+        (sensor.gaussian_sigma - nearest_width(kernel))
+        / sensor.parameters.uncertainty("gaussian_sigma"),
         (profile.force - LOAD) / profile.force_uncertainty,
         (float(restored.stress(0.0)) - on_axis) / float(restored.stress_uncertainty(0.0)),
     ]

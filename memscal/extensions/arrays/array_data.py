@@ -20,7 +20,7 @@ from functools import cached_property
 import numpy as np
 
 from memscal.axisymmetry.hankel import hankel_transform
-from memscal.axisymmetry.kernels import gaussian_transfer_slope
+from memscal.axisymmetry.kernels import gaussian_transfer, gaussian_transfer_slope
 from memscal.model.arrays import (
     BoolArray,
     FloatArray,
@@ -60,6 +60,21 @@ class ArrayReadings:
     u: FloatArray  # (n, t): readings, in V; NaN where missing, at a ceiling, or not used
     predicted: FloatArray  # (n, t): with baselines
     background: FloatArray  # (n, t): baselines and drifts
+
+
+def nearest_width(k: FloatArray, transfer: FloatArray, start: float) -> float:
+    """Return the width of the Gaussian nearest to a G in the plane, in m, by its transform."""
+    from scipy.optimize import minimize_scalar
+
+    # By Parseval's theorem the squares of transforms count by k dk.
+    area = k * np.gradient(k)
+    found = minimize_scalar(
+        lambda sigma: np.sum(area * (transfer - gaussian_transfer(k, sigma)) ** 2),
+        bounds=(start / 3, 3 * start),
+        method="bounded",
+        options={"xatol": 1e-6 * start},
+    )
+    return float(found.x)
 
 
 @keyword_array_record
@@ -174,7 +189,7 @@ class ArrayData(Checked):
     @property
     def sigma_columns(self) -> FloatArray:
         """Changes of the widths of the Gaussians nearest to each G, (n, c), in m."""
-        # Nearest in the plane: by Parseval's theorem the squares of transforms count by k dk.
+        # Of the nearest width, where Gaussian and G differ by little.
         area = self.k * np.gradient(self.k)
         changes = np.full((len(self.sensors), self.columns.shape[1]), np.nan)
         for i in np.flatnonzero(self.used).tolist():

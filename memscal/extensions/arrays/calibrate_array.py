@@ -23,7 +23,7 @@ from memscal.estimation.reference_spectra import (
     reference_spectra,
 )
 from memscal.extensions.arrays.array_checks import array_checks, array_messages
-from memscal.extensions.arrays.array_data import ArrayReadings
+from memscal.extensions.arrays.array_data import ArrayReadings, nearest_width
 from memscal.extensions.arrays.array_numbers import (
     array_numbers,
     input_columns,
@@ -418,7 +418,8 @@ def _array(scan: Scan, prepared: Prepared, found: Sorted, fit: JointFit) -> Sens
     state = fit.state
     unknown = np.repeat(~used[:, None], 2, axis=1)
     unknown[:, [axis for axis in (0, 1) if axis not in presses.axes]] = True
-    width = state.own[:, 0] if state.own.size else np.zeros(n)
+    k = fit.forward.k
+    widths = [nearest_width(k, kernel, fit.gaussian.sigma) for kernel in numbers.kernels]
     first = prepared.scans[0]
     rod = first.set_up.indenter
     assert isinstance(rod, Rod)
@@ -432,11 +433,11 @@ def _array(scan: Scan, prepared: Prepared, found: Sorted, fit: JointFit) -> Sens
         centres=np.where(unknown, np.nan, state.centres),
         crosstalk=np.where(near, state.crosstalk, np.eye(n)),
         estimated=near,
-        gaussian_sigmas=fit.gaussian.sigma * (1 + width) + missing,
+        gaussian_sigmas=np.resize(widths, n) + missing,
         baselines=state.drift[:, 0] + missing,
         baseline_uncertainties=np.linalg.norm(of_baselines, axis=1) + missing,
         noise=fit.noise.covariance + missing + missing[:, None],
-        k=fit.forward.k,
+        k=k,
         reference=fit.reference.values,
         kernels=numbers.kernels,
         modes=modes,
