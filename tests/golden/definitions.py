@@ -122,9 +122,7 @@ DEFINITIONS: Mapping[str, tuple[str, Mapping[str, Record], tuple[str, ...]]] = {
         {
             **RECORDS,
             "quality": _ANYTHING,
-            "indenter": records.INDENTER,
-            "sample": records.SAMPLE,
-            "sample/film": records.FILM,
+            **_SCANNED,
             "process": records.PROCESS,
         },
         (*RECORDS, "quality", "indenter", "sample", "process"),
@@ -155,7 +153,7 @@ def definition(schema: str) -> str:
     item = ET.SubElement(stated, "enumeration")
     ET.SubElement(item, "item", {"value": name})
     _field(entry, "title", "NX_CHAR", optional=True)
-    if schema in (writer.SCAN_SCHEMA, writer.ARTIFACT_SCHEMA):
+    if schema in (writer.SCAN_SCHEMA, writer.ARTIFACT_SCHEMA, writer.ARRAY_SCHEMA):
         for time in ("start_time", "end_time"):
             _field(entry, time, "NX_DATE_TIME", optional=True)
     if schema == writer.STRESS_SCHEMA:

@@ -14,6 +14,7 @@ from memscal.mechanics.indent import indent
 from memscal.model.checks import QualityCheck
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Rod
+from memscal.model.instrument import LoadCell
 from memscal.model.provenance import Process
 
 FILM = ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
@@ -121,5 +122,7 @@ def full_array(rows=2, columns=3, *, points=50, seed=0, **changes):
         "reading_high": np.full(n, 1.0),
         "checks": (QualityCheck("dead_taxels", 1.0, 0.0, False, "One is dead."),),
         "failing": {"dead_taxels": ("T05",)},
+        "load_cell": LoadCell(name="cell", serial_number="7"),
+        "start_time": "2026-01-02T03:04:05Z",
     }
     return replace(array, **(stated | changes))

@@ -33,6 +33,7 @@ from memscal.model.arrays import (
 from memscal.model.checks import Checked, QualityCheck
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Rod
+from memscal.model.instrument import Equipment, LoadCell, User
 from memscal.model.notation import VOLTS, Reading
 from memscal.model.provenance import Process
 
@@ -114,6 +115,11 @@ class ArrayData(Checked):
     checks: tuple[QualityCheck, ...] = ()
     failing: Mapping[str, tuple[str, ...]] = field(default_factory=dict)  # sensors, by check
     process: Process
+    load_cell: LoadCell = field(default_factory=LoadCell)
+    stage: Equipment = field(default_factory=Equipment)
+    user: User = field(default_factory=User)
+    start_time: str = ""
+    end_time: str = ""
 
     def stated(self) -> Values:
         """Return its fields by their names, without what follows from them."""

@@ -52,7 +52,7 @@ from memscal.model.film import LINEAR, FilmLaw
 from memscal.model.indenter import Rod
 from memscal.model.provenance import Process
 from memscal.model.result import Gridded, Shown
-from memscal.model.scan import Scan
+from memscal.model.scan import Scan, common_circumstances
 from memscal.parallel import single_threaded
 
 KernelModel = Literal["common", "own", "auto", "measured"]
@@ -462,6 +462,7 @@ def _array(scan: Scan, prepared: Prepared, found: Sorted, fit: JointFit) -> Sens
         reading_high=scan.reading_high,
         reading=prepared.reading,
         process=Process.of_now(input_scan=scan.source),
+        **common_circumstances([scan]),
     )
 
 

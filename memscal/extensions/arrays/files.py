@@ -6,6 +6,7 @@ The records of its groups stand in ``files.toml``.
 import tomllib
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,7 @@ from memscal.formats.hdf5.writer import ARRAY_SCHEMA, Group, Nodes, file_tree, t
 from memscal.formats.units import reading_of
 from memscal.model import records
 from memscal.model.arrays import Values
+from memscal.model.instrument import StressSensor
 from memscal.model.quantities import Quantity, Record, record
 
 _U_ZZ = "/entry/reconvolution/u_zz"
@@ -41,12 +43,14 @@ _PARTS = ("of_ln_a", "of_x", "of_y", "of_c", "of_mode")
 def write_array(data: ArrayData, path: FilePath, *, overwrite: bool = False) -> None:
     """Write an array as a memscal-array file; the same data, the same bytes."""
     stated = stated_in_file(data)
-    of_film: Any = data
+    of: Any = SimpleNamespace(**data.stated(), sensor=StressSensor())
     children: Nodes = {
         "title": f"Array of {len(data.sensors)} sensors",
-        **{name: write_record(of.read_in(data.reading), stated) for name, of in RECORDS.items()},
+        **{name: write_record(r.read_in(data.reading), stated) for name, r in RECORDS.items()},
         "quality": groups.quality_group(data.checks),
-        "sample": groups.sample_group(of_film),
+        "sample": groups.sample_group(of),
+        "instrument": groups.instrument_group(of),
+        **groups.circumstances(of),
         "indenter": groups.indenter_group(data.indenter, data),
         "process": write_record(records.PROCESS, data.process),
     }
@@ -100,6 +104,7 @@ def array_from(file: SafeFile) -> ArrayData:
     scale = np.outer(read["deviation"], read["deviation"])
     film, indenter = groups.read_stated(file)
     read |= {
+        **groups.read_circumstances(file),
         "sensors": names,
         "used": read["used"] > 0,
         "centres": np.column_stack([read["centre_x"], read["centre_y"]]),
@@ -132,6 +137,10 @@ KIND = (
         **{f"/entry/{name}": of for name, of in RECORDS.items()},
         "/entry/indenter": records.INDENTER,
         "/entry/sample/film": records.FILM,
+        "/entry/instrument/load_cell": records.LOAD_CELL,
+        "/entry/instrument/stage": records.STAGE,
+        "/entry/user": records.USER,
+        "/entry": records.TIMES,
         "/entry/process": records.PROCESS,
     },
 )

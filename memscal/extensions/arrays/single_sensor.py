@@ -98,6 +98,11 @@ def single_sensor(array: ArrayData, name: str) -> ApparatusFunction:
             indenter=array.indenter,
         ),
         process=array.process,
+        load_cell=array.load_cell,
+        stage=array.stage,
+        user=array.user,
+        start_time=array.start_time,
+        end_time=array.end_time,
         budget={
             str(quantity): {source: abs(float(u)) for source, u in _by_source(array, row).items()}
             for quantity, row in zip(_ESTIMATED[:2], columns, strict=False)

@@ -26,7 +26,16 @@ def test_what_is_stored_comes_back(tmp_path, own):
     for name in ("centres", "crosstalk", "covariance", "noise", "root", "k", "kernels", "layout"):
         expected = getattr(array, name)
         np.testing.assert_allclose(getattr(found, name), expected, rtol=1e-14, err_msg=name)
-    for name in ("sensors", "failing", "checks", "kernel", "process", "reading"):
+    for name in (
+        "sensors",
+        "failing",
+        "checks",
+        "kernel",
+        "process",
+        "reading",
+        "load_cell",
+        "start_time",
+    ):
         assert getattr(found, name) == getattr(array, name), name
     np.testing.assert_allclose(found.readings.u, array.readings.u, rtol=1e-14)
     # Units round a number once.
