@@ -112,7 +112,8 @@ def sorted_readings(scan: Scan, places: FloatArray, u: FloatArray) -> Sorted:
             at_ceiling[i] += clipped.size
     peak, baseline, noise = numbers
     stated = np.ones(n, bool) if scan.used is None else scan.used
-    dead = stated & (peak <= _DEAD * noise)
+    # The few outermost readings of one sensor may scatter by less than its noise.
+    dead = stated & (peak <= _DEAD * np.maximum(noise, np.median(noise)))
     used = stated & ~dead
     return Sorted(keep & used[:, None], used, dead, at_ceiling * used, peak, baseline, noise)
 

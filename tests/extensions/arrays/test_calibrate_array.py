@@ -8,6 +8,7 @@ from helpers.true_arrays import Errors, simulated_scan
 
 import memscal
 from memscal.errors import FitError, InputError, MemscalError
+from memscal.extensions.arrays.presses import sorted_readings
 
 
 def deviations(array, true):
@@ -119,3 +120,15 @@ def refused_scans():
 def test_refused(scan, options, error, word):
     with pytest.raises(error, match=word):
         memscal.calibrate_array(scan, **options)
+
+
+def test_dead_sensors_that_drift_are_dead(seed):
+    rng = np.random.default_rng(seed)
+    scan, _ = simulated_scan()
+    dead = 400
+    drift = np.linspace(-0.5, 0.5, scan.x.size) * rng.normal(0.0, 0.01, (dead, 1))
+    silent = scan.u_zz.max() * (drift + rng.normal(0.0, 0.005, (dead, scan.x.size)))
+    u = np.vstack([*[scan.u_zz] * 7, silent])
+    many = memscal.Scan(x=scan.x, u_zz=u, sensors=[f"T{i}" for i in range(len(u))])
+    found = sorted_readings(many, np.stack(scan.of_sensor(0).positions), u)
+    np.testing.assert_array_equal(found.dead, np.arange(len(u)) >= 70)
