@@ -11,7 +11,6 @@ from memscal.cli.options import (
     FILE,
     NonNegative,
     Quantity,
-    accept_altered_option,
     figure_option,
     indenter_from,
     option,
@@ -52,7 +51,6 @@ def _indenter(ctx: click.Context, param: click.Parameter, text: str) -> Any:
 )
 @option("--u-unit", "UNIT")("Unit of the readings where the heads of the table state none.")
 @out_option("Table to write (.csv): place and force of each frame, with uncertainties and flags.")
-@accept_altered_option
 @figure_option("Draw places and forces.")
 @output_options
 def command(
@@ -70,7 +68,7 @@ def command(
     from memscal.extensions.arrays.frames import read_frames
     from memscal.extensions.arrays.sensor_array import load_array
 
-    held = load_array(array, accept_altered=options["accept_altered"])
+    held = load_array(array)
     read = read_frames(held, frames, options["u_unit"])
     zero = None if rest is None else read_frames(held, rest, options["u_unit"]).u
     with out.working("Locating"):

@@ -62,7 +62,7 @@ def answer(contacts: Contacts) -> str:
 def tables(contacts: Contacts) -> list[Table]:
     """Return the first frames, with standard uncertainties."""
     heads, rows = _cells(contacts, _SHORT)
-    title = f"Contacts, up to {_PRINTED} of {counted(len(rows), 'frames')}"
+    title = f"Contacts: the first {min(len(rows), _PRINTED)} of {counted(len(rows), 'frames')}"
     return [Table(title, heads[:_COLUMNS], [row[:_COLUMNS] for row in rows[:_PRINTED]])]
 
 
