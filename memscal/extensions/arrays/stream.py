@@ -38,6 +38,7 @@ from memscal.extensions.arrays.array_data import ArrayData
 from memscal.extensions.arrays.locate import DETECTED, Seeking, Touch, columns_of, patterns
 from memscal.model.arrays import (
     TINY,
+    ArrayPair,
     BoolArray,
     Columns,
     FloatArray,
@@ -64,6 +65,8 @@ _STRENGTHS = np.array([0.04, 0.008, 0.2]) / 100
 _COMMON = 10.0
 #: Share of the evidence for a strength that a block leaves: it fades in 10 minutes.
 _KEPT = 1 - _BLOCK / 600
+#: Share of chi-square that a contact need not explain: errors of the array, size and shear of it.
+_MISFIT = 1e-3
 #: A baseline that is not known may be so many largest readings away.
 _DIFFUSE = 10.0
 #: Share of the last second's blocks that one sensor alone contradicts, at which it is dropped.
@@ -104,18 +107,10 @@ class _Fit:
     node: IndexArray  # (f,): of the grid, near the place
     place: FloatArray  # (f, 2), in m
     force: FloatArray  # (f,), in N
-    chi2: FloatArray  # (m,)
+    total: FloatArray  # (m,): chi-square without a contact
+    chi2: FloatArray  # (m,): and with it
     jacobian: FloatArray  # (f, c, n): changes by x (and y) and by force
     covariance: FloatArray  # (f, c, c): of these
-
-
-@array_record
-class _Errors:
-    """What errors of the array do to a contact of 1 N."""
-
-    readings: FloatArray  # (n, n): covariance, in V^2
-    contact: FloatArray  # (c, c): covariance of x (and y) in m and force in N
-    misfit: float  # chi-square that no contact explains
 
 
 class Stream:
@@ -145,7 +140,7 @@ class Stream:
         self._sensors = self._seeking.fields.sensors
         self._nodes = self._seeking.grid(_STEP)
         self._grid = self._seeking.fields.normal(self._nodes)[0]
-        self._errors: dict[int, _Errors] = {}
+        self._errors: dict[int, ArrayPair] = {}
         self._noise = array.noise[np.ix_(self._sensors, self._sensors)]
         self._peak = array.load * self._grid.max()
         own = self._peak * _STRENGTHS
@@ -153,9 +148,8 @@ class Stream:
         if drift is not None:
             common, own = floats(drift)[:, None]
         n = self._sensors.size
-        walk = np.multiply.outer(common**2, np.ones((n, n)))
-        walk += np.multiply.outer(own**2, np.eye(n))
-        self._walk = walk * self._length / rate
+        variances = np.square([common, own])[..., None, None] * self._length / rate
+        self._walk = variances[0] + variances[1] * np.eye(n)
         self._now = SimpleNamespace(
             frames=np.array(0),
             last=np.zeros(n),
@@ -284,14 +278,13 @@ class Stream:
             records["x"][rows] = fit.place[:, 0]
             records["y"][rows] = fit.place[:, 1]
             records["force"][rows] = fit.force
-            errors = [self._errors_at(node) for node in fit.node]
-            # Those of the place do not depend on the force, that of the force grows with it.
-            shares = np.array([error.contact for error in errors]).reshape(fit.covariance.shape)
+            # Errors of the place do not depend on the force, that of the force grows with it.
+            shares = np.array([self._errors_at(node)[1] for node in fit.node])
+            shares = shares.reshape(fit.covariance.shape)
             shares[:, -1] *= fit.force[:, None]
             shares[..., -1] *= fit.force[:, None]
             records["covariance"][np.ix_(rows, self._told, self._told)] = fit.covariance + shares
-            misfit = fit.force**2 * [error.misfit for error in errors]
-            limit = chdtri(freedom, FALSE_ALARM) * (1 + misfit / max(freedom, 1))
+            limit = np.maximum(chdtri(freedom, FALSE_ALARM), _MISFIT * fit.total[fit.rows])
             records["flags"][rows] |= FrameFlag.TWO_CONTACTS * (fit.chi2[fit.rows] > limit)
             records["flags"][rows] |= FrameFlag.EDGE * (self._seeking.outside(fit.place) > 0)
 
@@ -306,6 +299,7 @@ class Stream:
         node = node[rows]
         place = self._nodes[node]
         force = significance[rows, node] / size[node]
+        least = force / 10
         longest = _STEP * seeking.thickness
         for _ in range(_STEPS):
             value, by_x, by_y = seeking.fields.normal(place, force)
@@ -318,30 +312,33 @@ class Stream:
             slope = np.einsum("fin,fn->fi", filtered, deviations[rows])
             # Readings are linear in the force, not in its change.
             step = np.einsum("fij,fj->fi", covariance, slope)
-            force = step[:, -1]
+            force = np.maximum(step[:, -1], least)
             place[:, seeking.axes] += np.clip(step[:, :-1], -longest, longest)
             place = np.clip(place, seeking.low, seeking.high)
-        chi2 = np.sum(deviations @ weight * deviations, axis=1)
+        total = np.sum(deviations @ weight * deviations, axis=1)
+        chi2 = total.copy()
         chi2[rows] -= np.sum(step * slope, axis=1)
-        return _Fit(rows, node, place, force, chi2, jacobian, covariance)
+        return _Fit(rows, node, place, force, total, chi2, jacobian, covariance)
 
-    def _errors_at(self, node: int) -> _Errors:
-        """Return what errors of the array do to a contact of 1 N at a node of the grid."""
+    def _errors_at(self, node: int) -> ArrayPair:
+        """Return what errors of the array do to a contact of 1 N at a node of the grid.
+
+        Covariances of readings in V^2, (n, n), and of x (and y) in m and force in N, (c, c).
+        """
         if node not in self._errors:
             contact = self._nodes[[node]], np.ones(1), np.zeros((1, 2))
             [root] = self._seeking.fields.errors(*contact)
             slopes = self._seeking.fields.forward(*contact)[1][0][:, self._told]
             weighted = np.linalg.solve(self._noise, slopes)
             moved = np.linalg.solve(slopes.T @ weighted, weighted.T @ root)
-            left = root - slopes @ moved
-            misfit = np.sum(left * np.linalg.solve(self._noise, left))
-            self._errors[node] = _Errors(root @ root.T, moved @ moved.T, misfit)
+            self._errors[node] = root @ root.T, moved @ moved.T
         return self._errors[node]
 
     def _finish_block(self) -> None:
         """Move the baselines by the means of a block."""
         now = self._now
-        mean = now.sums / np.maximum(now.counts, 1)
+        counts = np.maximum(now.counts, 1)
+        mean = now.sums / counts
         seen = now.counts >= self._length / 2
         now.unchanged = np.where(now.changed, 0.0, now.unchanged + self._length / self._rate)
         now.baselines[:, ~self._kept()] = np.nan
@@ -351,21 +348,20 @@ class Stream:
         now.covariance *= np.multiply.outer(~begin, ~begin)
         now.covariance += (_DIFFUSE * self._peak) ** 2 * np.diag(begin)
         if seen.sum() > self._told.size:
-            self._update(np.where(seen, mean - now.baselines, 0.0), seen)
+            noise = self._noise / np.sqrt(np.multiply.outer(counts, counts))
+            self._update(np.where(seen, mean - now.baselines, 0.0), noise, seen)
         for name in ("sums", "counts", "changed"):
             vars(now)[name][:] = 0
 
-    def _update(self, deviations: FloatArray, seen: BoolArray) -> None:
+    def _update(self, deviations: FloatArray, noise: FloatArray, seen: BoolArray) -> None:
         """Move the baselines by deviations (strengths, n) from them."""
         now = self._now
         best = now.evidence.argmax()
-        noise = self._noise / np.sqrt(np.multiply.outer(now.counts, now.counts) + TINY)
         summed = _block(now.covariance + noise, seen)
-        weight = np.linalg.inv(summed[best]) * seen
-        fit = self._fit(deviations[[best]], weight, _SPARED)
+        fit = self._fit(deviations[[best]], np.linalg.inv(summed[best]) * seen, _SPARED)
         jacobian = fit.jacobian.reshape(-1, seen.size)
         for node, force in zip(fit.node, fit.force, strict=True):
-            summed += force**2 * _block(self._errors_at(node).readings, seen)
+            summed += force**2 * _block(self._errors_at(node)[0], seen)
         weight = np.linalg.inv(summed) * seen
         filtered = weight @ jacobian.T
         information = jacobian @ filtered
@@ -375,14 +371,14 @@ class Stream:
 
         freedom = seen.sum() - len(jacobian)
         limit = chdtri(freedom, FALSE_ALARM)
+        # What chi-square loses without one of the sensors.
+        alone = pulls[best] ** 2 / (np.diag(weight[best]) + TINY)
+        now.doubt[seen] *= 1 - _BLOCK / _PATIENCE
         if chi2[best] < limit:
             determinants = np.linalg.slogdet(summed)[1] + np.linalg.slogdet(information)[1]
             now.evidence = _KEPT * now.evidence - (chi2 + determinants) / 2
-        # What chi-square loses without one of the sensors.
-        alone = pulls[best] ** 2 / (np.diag(weight[best]) + TINY)
-        guilty = (alone == alone.max()) & (chi2[best] > limit) & (chi2[best] - alone < limit)
-        change = (guilty * (freedom > 1) - now.doubt) * _BLOCK / _PATIENCE
-        now.doubt += np.where(now.doubt < _DROPPED, change, 0.0)
+        elif freedom > 1 and chi2[best] - alone.max() < limit:
+            now.doubt[alone.argmax()] += _BLOCK / _PATIENCE
 
         # What one contact does not explain moves the baselines less.
         share = limit / np.maximum(chi2, limit)
