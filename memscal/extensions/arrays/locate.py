@@ -272,7 +272,7 @@ def locate(
     fields = seeking.fields
     readings = columns_of(array, u, "u")
     zero, scatter = _zero(array, rest)
-    saturated = _at_an_end(array, readings, tared=rest is None)
+    saturated = at_an_end(array, readings, tared=rest is None)
     values = np.where(saturated, np.nan, readings - zero)[:, fields.sensors]
     state = np.full((len(values), 5), np.nan)
     covariance = np.full((len(values), 3, 3), np.nan)
@@ -356,7 +356,7 @@ def _zero(array: ArrayData, rest: ArrayLike | None) -> ArrayPair:
     return zero, scatter.filled(0.0) / len(frames)
 
 
-def _at_an_end(array: ArrayData, readings: FloatArray, *, tared: bool) -> BoolArray:
+def at_an_end(array: ArrayData, readings: FloatArray, *, tared: bool) -> BoolArray:
     """Return which readings are at an end of a sensor's range, and none."""
     # Where readings are tared their baselines may have been those of the scan, or none.
     baseline = np.nan_to_num(array.baselines) * tared

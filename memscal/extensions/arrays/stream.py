@@ -25,6 +25,7 @@ them at once, and the one under which the readings are most probable holds.
 from __future__ import annotations
 
 from copy import deepcopy
+from dataclasses import replace
 from enum import IntFlag
 from types import SimpleNamespace
 from typing import Any
@@ -35,9 +36,15 @@ from scipy.special import chdtri
 
 from memscal.errors import InputError
 from memscal.extensions.arrays.array_data import ArrayData
-from memscal.extensions.arrays.locate import DETECTED, Seeking, Touch, columns_of, patterns
+from memscal.extensions.arrays.locate import (
+    DETECTED,
+    Seeking,
+    Touch,
+    at_an_end,
+    columns_of,
+    patterns,
+)
 from memscal.model.arrays import (
-    TINY,
     ArrayPair,
     BoolArray,
     Columns,
@@ -49,9 +56,10 @@ from memscal.model.arrays import (
 )
 from memscal.model.checks import FALSE_ALARM
 
-#: Duration of a block of the filter, in s, and for how long a stuck sensor is unchanged.
+#: Duration of a block of the filter, in s.  A sensor is stuck if it is unchanged for longer than
+#: the other time, from the beginning of the block of its last change.
 _BLOCK = 0.2
-_PATIENCE = 1.0
+_PATIENCE = 1.1
 #: Contacts are sought so many thicknesses beyond the sensors, on a grid of this step; steps of
 #: Gauss-Newton from its best node, each of at most a step of the grid.
 _MARGIN = 1.0
@@ -67,10 +75,12 @@ _COMMON = 10.0
 _KEPT = 1 - _BLOCK / 600
 #: Share of chi-square that a contact need not explain: errors of the array, size and shear of it.
 _MISFIT = 1e-3
-#: A baseline that is not known may be so many largest readings away.
-_DIFFUSE = 10.0
-#: Share of the last second's blocks that one sensor alone contradicts, at which it is dropped.
+#: Standard deviation of what is not known, baselines and readings, in largest readings.
+_UNKNOWN = 100.0
+#: Share of the blocks that one sensor alone contradicts, at which it is dropped; weight of the
+#: newest in it: after most of a second.
 _DROPPED = 0.5
+_NEWEST = 0.2
 
 
 class FrameFlag(IntFlag):
@@ -107,9 +117,8 @@ class _Fit:
     node: IndexArray  # (f,): of the grid, near the place
     place: FloatArray  # (f, 2), in m
     force: FloatArray  # (f,), in N
-    total: FloatArray  # (m,): chi-square without a contact
-    chi2: FloatArray  # (m,): and with it
-    jacobian: FloatArray  # (f, c, n): changes by x (and y) and by force
+    chi2: FloatArray  # (m,)
+    jacobian: FloatArray  # (f, c, n): changes by force times x (and y) and by force
     covariance: FloatArray  # (f, c, c): of these
 
 
@@ -128,13 +137,12 @@ class Stream:
         indenter: Touch,
     ) -> None:
         require_positive("rate", rate, "Hz")
+        if limit:
+            low, high = map(floats, limit)
+            array = replace(array, reading_low=low, reading_high=high)
         self._array = array
         self._rate = rate
         self._length = max(1, round(_BLOCK * rate))
-        low, high = limit or (array.reading_low, array.reading_high)
-        # What is not stated is NaN, which nothing exceeds.
-        self._low = np.array(low, float)
-        self._high = np.array(high, float)
         self._seeking = Seeking.on(array, indenter, 0.0, _MARGIN)
         self._told = np.array([*self._seeking.axes, 2])
         self._sensors = self._seeking.fields.sensors
@@ -142,8 +150,9 @@ class Stream:
         self._grid = self._seeking.fields.normal(self._nodes)[0]
         self._errors: dict[int, ArrayPair] = {}
         self._noise = array.noise[np.ix_(self._sensors, self._sensors)]
-        self._peak = array.load * self._grid.max()
-        own = self._peak * _STRENGTHS
+        peak = array.load * self._grid.max()
+        self._unknown = (_UNKNOWN * peak) ** 2
+        own = peak * _STRENGTHS
         common = _COMMON * own
         if drift is not None:
             common, own = floats(drift)[:, None]
@@ -156,8 +165,7 @@ class Stream:
             # Of the current block.
             sums=np.zeros(n),
             counts=np.zeros(n),
-            changed=np.zeros(n, bool),
-            # In seconds, and the share of blocks that a sensor alone contradicts.
+            # Seconds, and the share of blocks that a sensor alone contradicts.
             unchanged=np.zeros(n),
             doubt=np.zeros(n),
             # By strength of the drift; a baseline that is not known is NaN.
@@ -169,14 +177,12 @@ class Stream:
     @property
     def left_out(self) -> dict[str, str]:
         """Why sensors are left out at present, by their names."""
-        reasons = dict.fromkeys(self._array.sensors, "dead in the calibration")
-        stuck = self._now.unchanged >= _PATIENCE
-        for sensor, is_stuck, kept in zip(self._sensors, stuck, self._kept(), strict=True):
-            name = self._array.sensors[sensor]
-            reasons[name] = "unchanged for 1 s" if is_stuck else "contradicts all others"
-            if kept:
-                del reasons[name]
-        return reasons
+        sensors = self._array.sensors
+        reasons = np.full(len(sensors), "dead in the calibration")
+        reasons[self._sensors] = self._reasons()
+        return {
+            name: reason for name, reason in zip(sensors, reasons.tolist(), strict=True) if reason
+        }
 
     def push(self, block: ArrayLike) -> NDArray[Any]:
         """Take frames, and return what presses in each of them.
@@ -223,32 +229,27 @@ class Stream:
             If the state is not of such a stream.
         """
         now = vars(self._now)
-        try:
-            restored = {
-                name: np.array(state[name], value.dtype).reshape(value.shape)
-                for name, value in now.items()
-            }
-        except (KeyError, TypeError, ValueError) as error:
-            raise InputError(
-                f"The state is not of a stream of this array and these arguments: {error}."
-            ) from error
-        now.update(restored)
+        shapes = {name: np.shape(value) for name, value in state.items()}
+        if shapes != {name: value.shape for name, value in now.items()}:
+            raise InputError("The state is not of a stream of this array and these arguments.")
+        for name, value in now.items():
+            value[...] = state[name]
 
-    def _kept(self) -> BoolArray:
-        """Which sensors are neither stuck nor in doubt."""
-        now = self._now
-        kept: BoolArray = (now.unchanged < _PATIENCE) & (now.doubt < _DROPPED)
-        return kept
+    def _reasons(self) -> NDArray[np.str_]:
+        """Why used sensors are left out; empty if they are not."""
+        doubted = np.where(self._now.doubt >= _DROPPED, "contradicts all others", "")
+        return np.where(self._now.unchanged > _PATIENCE, "unchanged for 1 s", doubted)
 
     def _take(self, given: FloatArray, records: NDArray[Any]) -> None:
         """Fill the records of frames within one block of the filter."""
         now = self._now
-        saturated = ((given <= self._low) | (given >= self._high))[:, self._sensors]
+        saturated = at_an_end(self._array, given, tared=False)[:, self._sensors]
         readings = given[:, self._sensors]
         missing = ~np.isfinite(readings)
-        valid = ~(missing | saturated) & self._kept()
-        now.changed |= (readings != np.vstack([now.last, readings[:-1]])).any(axis=0)
-        now.last = readings[-1]
+        valid = ~(missing | saturated)
+        changed = (readings != np.vstack([now.last, readings[:-1]])).any(axis=0)
+        now.unchanged[changed] = 0.0
+        now.last[:] = readings[-1]
         now.sums += np.where(valid, readings, 0.0).sum(axis=0)
         now.counts += valid.sum(axis=0)
 
@@ -256,21 +257,22 @@ class Stream:
         now.frames += len(records)
         for name in ("x", "y", "covariance"):
             records[name] = np.nan
+        best = now.evidence.argmax()
+        known = np.isfinite(now.baselines[best])
         records["flags"] = (
             FrameFlag.MISSING * missing.any(axis=1)
             + FrameFlag.SATURATED * saturated.any(axis=1)
-            + FrameFlag.DROPPED * bool(self.left_out)
+            + FrameFlag.DROPPED * (known.sum() < given.shape[1])
         )
-        best = now.evidence.argmax()
         covariance = now.covariance[best] + self._walk[best] + self._noise
         deviations = readings - now.baselines[best]
-        for seen, frames in patterns(valid & np.isfinite(deviations)):
+        for seen, frames in patterns(valid & known):
             freedom = seen.sum() - self._told.size
             if freedom < 0:
                 records["flags"][frames] |= FrameFlag.NO_READING
                 records["force"][frames] = np.nan
                 continue
-            weight = floats(np.linalg.inv(_block(covariance, seen)) * seen)
+            weight = floats(np.linalg.inv(covariance + self._unknown * np.diag(~seen)))
             fit = self._fit(np.where(seen, deviations[frames], 0.0), weight, DETECTED)
             records["chi2"][frames] = fit.chi2
             rows = frames[fit.rows]
@@ -278,13 +280,15 @@ class Stream:
             records["x"][rows] = fit.place[:, 0]
             records["y"][rows] = fit.place[:, 1]
             records["force"][rows] = fit.force
-            # Errors of the place do not depend on the force, that of the force grows with it.
-            shares = np.array([self._errors_at(node)[1] for node in fit.node])
-            shares = shares.reshape(fit.covariance.shape)
-            shares[:, -1] *= fit.force[:, None]
-            shares[..., -1] *= fit.force[:, None]
-            records["covariance"][np.ix_(rows, self._told, self._told)] = fit.covariance + shares
-            limit = np.maximum(chdtri(freedom, FALSE_ALARM), _MISFIT * fit.total[fit.rows])
+            # Of force times place, and of force; then of place.
+            force = fit.force[:, None, None]
+            shares = [self._errors_at(node)[1] for node in fit.node]
+            total = fit.covariance + np.reshape(shares, fit.covariance.shape) * force**2
+            limit = _MISFIT * fit.force**2 / total[:, -1, -1]
+            total[:, :-1] /= force
+            total[..., :-1] /= force
+            records["covariance"][np.ix_(rows, self._told, self._told)] = total
+            limit = np.maximum(limit, chdtri(freedom, FALSE_ALARM))
             records["flags"][rows] |= FrameFlag.TWO_CONTACTS * (fit.chi2[fit.rows] > limit)
             records["flags"][rows] |= FrameFlag.EDGE * (self._seeking.outside(fit.place) > 0)
 
@@ -292,7 +296,7 @@ class Stream:
         """Find one contact in each of some deviations from the baselines."""
         seeking = self._seeking
         filtered = self._grid @ weight
-        size = np.sqrt(np.sum(filtered * self._grid, axis=1)) + TINY
+        size = np.sqrt(np.sum(filtered * self._grid, axis=1))
         significance = deviations @ (filtered.T / size)
         node = significance.argmax(axis=1)
         rows = np.flatnonzero(significance.max(axis=1) > threshold)
@@ -303,22 +307,20 @@ class Stream:
         longest = _STEP * seeking.thickness
         for _ in range(_STEPS):
             value, by_x, by_y = seeking.fields.normal(place, force)
-            scale = force[:, None]
-            jacobian = np.stack([scale * by_x, scale * by_y, value], axis=1)[:, self._told]
+            jacobian = np.stack([by_x, by_y, value], axis=1)[:, self._told]
             # A product with one large matrix is faster than one with each small one.
             filtered = jacobian.reshape(-1, len(weight)) @ weight
             filtered = filtered.reshape(jacobian.shape)
             covariance = np.linalg.inv(filtered @ jacobian.swapaxes(1, 2))
             slope = np.einsum("fin,fn->fi", filtered, deviations[rows])
-            # Readings are linear in the force, not in its change.
+            # Of the force times the step in x (and y), and of the force.
             step = np.einsum("fij,fj->fi", covariance, slope)
             force = np.maximum(step[:, -1], least)
-            place[:, seeking.axes] += np.clip(step[:, :-1], -longest, longest)
+            place[:, seeking.axes] += np.clip(step[:, :-1] / force[:, None], -longest, longest)
             place = np.clip(place, seeking.low, seeking.high)
-        total = np.sum(deviations @ weight * deviations, axis=1)
-        chi2 = total.copy()
+        chi2 = np.sum(deviations @ weight * deviations, axis=1)
         chi2[rows] -= np.sum(step * slope, axis=1)
-        return _Fit(rows, node, place, force, total, chi2, jacobian, covariance)
+        return _Fit(rows, node, place, force, chi2, jacobian, covariance)
 
     def _errors_at(self, node: int) -> ArrayPair:
         """Return what errors of the array do to a contact of 1 N at a node of the grid.
@@ -339,30 +341,31 @@ class Stream:
         now = self._now
         counts = np.maximum(now.counts, 1)
         mean = now.sums / counts
-        seen = now.counts >= self._length / 2
-        now.unchanged = np.where(now.changed, 0.0, now.unchanged + self._length / self._rate)
-        now.baselines[:, ~self._kept()] = np.nan
+        now.unchanged += self._length / self._rate
+        dropped = self._reasons() != ""
+        now.baselines[:, dropped] = np.nan
+        seen = ~dropped & (now.counts >= self._length / 2)
         begin = seen & np.isnan(now.baselines[0])
         now.baselines[:, begin] = mean[begin]
         now.covariance += self._walk
         now.covariance *= np.multiply.outer(~begin, ~begin)
-        now.covariance += (_DIFFUSE * self._peak) ** 2 * np.diag(begin)
+        now.covariance += self._unknown * np.diag(begin)
         if seen.sum() > self._told.size:
             noise = self._noise / np.sqrt(np.multiply.outer(counts, counts))
             self._update(np.where(seen, mean - now.baselines, 0.0), noise, seen)
-        for name in ("sums", "counts", "changed"):
-            vars(now)[name][:] = 0
+        now.sums[:] = 0.0
+        now.counts[:] = 0.0
 
     def _update(self, deviations: FloatArray, noise: FloatArray, seen: BoolArray) -> None:
         """Move the baselines by deviations (strengths, n) from them."""
         now = self._now
         best = now.evidence.argmax()
-        summed = _block(now.covariance + noise, seen)
-        fit = self._fit(deviations[[best]], np.linalg.inv(summed[best]) * seen, _SPARED)
+        summed = now.covariance + noise + self._unknown * np.diag(~seen)
+        fit = self._fit(deviations[[best]], np.linalg.inv(summed[best]), _SPARED)
         jacobian = fit.jacobian.reshape(-1, seen.size)
-        for node, force in zip(fit.node, fit.force, strict=True):
-            summed += force**2 * _block(self._errors_at(node)[0], seen)
-        weight = np.linalg.inv(summed) * seen
+        for node in fit.node:
+            summed += fit.force**2 * self._errors_at(node)[0]
+        weight = np.linalg.inv(summed)
         filtered = weight @ jacobian.T
         information = jacobian @ filtered
         weight -= filtered @ np.linalg.inv(information) @ filtered.swapaxes(1, 2)
@@ -372,23 +375,18 @@ class Stream:
         freedom = seen.sum() - len(jacobian)
         limit = chdtri(freedom, FALSE_ALARM)
         # What chi-square loses without one of the sensors.
-        alone = pulls[best] ** 2 / (np.diag(weight[best]) + TINY)
-        now.doubt[seen] *= 1 - _BLOCK / _PATIENCE
+        alone = pulls[best] ** 2 / np.diag(weight[best])
+        now.doubt[seen] *= 1 - _NEWEST
         if chi2[best] < limit:
             determinants = np.linalg.slogdet(summed)[1] + np.linalg.slogdet(information)[1]
             now.evidence = _KEPT * now.evidence - (chi2 + determinants) / 2
         elif freedom > 1 and chi2[best] - alone.max() < limit:
-            now.doubt[alone.argmax()] += _BLOCK / _PATIENCE
+            now.doubt[alone.argmax()] += _NEWEST
 
         # What one contact does not explain moves the baselines less.
-        share = limit / np.maximum(chi2, limit)
-        gain = share[:, None, None] * now.covariance @ weight
+        share = (limit / np.maximum(chi2, limit))[:, None, None]
+        gain = share * now.covariance @ weight
         now.baselines += np.einsum("sij,sj->si", gain, deviations)
         now.covariance -= gain @ now.covariance
         # By rounding alone it would grow asymmetric, from block to block.
         now.covariance = (now.covariance + now.covariance.swapaxes(1, 2)) / 2
-
-
-def _block(covariance: FloatArray, seen: BoolArray) -> FloatArray:
-    """Return covariances with ones in place of the sensors that are not seen."""
-    return np.where(np.multiply.outer(seen, seen), covariance, np.eye(seen.size))
