@@ -147,10 +147,10 @@ class Stream:
         self._told = np.array([*self._seeking.axes, 2])
         self._sensors = self._seeking.fields.sensors
         self._nodes = self._seeking.grid(_STEP)
-        self._grid = self._seeking.fields.normal(self._nodes)[0]
+        self._grid = self._slopes(self._nodes, array.load)
         self._errors: dict[int, ArrayPair] = {}
         self._noise = array.noise[np.ix_(self._sensors, self._sensors)]
-        peak = array.load * self._grid.max()
+        peak = array.load * self._grid[:, -1].max()
         self._unknown = (_UNKNOWN * peak) ** 2
         own = peak * _STRENGTHS
         common = _COMMON * own
@@ -292,11 +292,17 @@ class Stream:
             records["flags"][rows] |= FrameFlag.TWO_CONTACTS * (fit.chi2[fit.rows] > limit)
             records["flags"][rows] |= FrameFlag.EDGE * (self._seeking.outside(fit.place) > 0)
 
+    def _slopes(self, place: FloatArray, force: FloatArray | float) -> FloatArray:
+        """Return changes of readings by force times x (and y), and by force, (m, c, n)."""
+        value, by_x, by_y = self._seeking.fields.normal(place, force)
+        return np.stack([by_x, by_y, value], axis=1)[:, self._told]
+
     def _fit(self, deviations: FloatArray, weight: FloatArray, threshold: float) -> _Fit:
         """Find one contact in each of some deviations from the baselines."""
         seeking = self._seeking
-        filtered = self._grid @ weight
-        size = np.sqrt(np.sum(filtered * self._grid, axis=1))
+        grid = self._grid[:, -1]
+        filtered = grid @ weight
+        size = np.sqrt(np.sum(filtered * grid, axis=1))
         significance = deviations @ (filtered.T / size)
         node = significance.argmax(axis=1)
         rows = np.flatnonzero(significance.max(axis=1) > threshold)
@@ -305,9 +311,8 @@ class Stream:
         force = significance[rows, node] / size[node]
         least = force / 10
         longest = _STEP * seeking.thickness
-        for _ in range(_STEPS):
-            value, by_x, by_y = seeking.fields.normal(place, force)
-            jacobian = np.stack([by_x, by_y, value], axis=1)[:, self._told]
+        for number in range(_STEPS):
+            jacobian = self._slopes(place, force) if number else self._grid[node]
             # A product with one large matrix is faster than one with each small one.
             filtered = jacobian.reshape(-1, len(weight)) @ weight
             filtered = filtered.reshape(jacobian.shape)
@@ -330,7 +335,7 @@ class Stream:
         if node not in self._errors:
             contact = self._nodes[[node]], np.ones(1), np.zeros((1, 2))
             [root] = self._seeking.fields.errors(*contact)
-            slopes = self._seeking.fields.forward(*contact)[1][0][:, self._told]
+            slopes = self._grid[node].T
             weighted = np.linalg.solve(self._noise, slopes)
             moved = np.linalg.solve(slopes.T @ weighted, weighted.T @ root)
             self._errors[node] = root @ root.T, moved @ moved.T
