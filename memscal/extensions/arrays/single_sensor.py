@@ -19,6 +19,18 @@ from memscal.model.instrument import StressSensor
 from memscal.model.stress import StressProfile
 
 _ESTIMATED = np.array(["conversion_constant", "gaussian_sigma", "centre", "centre_y", "baseline"])
+#: What is that of the array.
+_SAME = [
+    "film",
+    "indenter",
+    "load",
+    "process",
+    "load_cell",
+    "stage",
+    "user",
+    "start_time",
+    "end_time",
+]
 
 
 def single_sensor(array: ArrayData, name: str) -> ApparatusFunction:
@@ -32,39 +44,25 @@ def single_sensor(array: ArrayData, name: str) -> ApparatusFunction:
             cure="Calibrate it with kernel='common' or 'own'.",
         )
     i = array.sensors.index(name)
-    a = array.conversion_constants[i]
-    sigma = array.gaussian_sigmas[i]
-    of_a, of_x, of_y = (part[i] for part in array.split(array.columns)[:3])
-    of_sigma = array.sigma_columns[i]
-    values = np.array([a, sigma, *array.centres[i], array.baselines[i]])
-    columns = np.stack([a * of_a, of_sigma, of_x, of_y, np.zeros_like(of_a)])
-    covariance = columns @ columns.T
-    if array.baseline_uncertainties is not None:
-        covariance[-1, -1] = array.baseline_uncertainties[i] ** 2
-    # A line tells no centre across it.
-    known = np.isfinite(values)
+    parameters, rows = _parameters(array, i)
+    a, sigma = parameters.values[:2]
+    of_a = rows[0] / a
+    kernel, changes, of_modes = array.kernel_of(i)
+    of_kernel = changes.T @ of_modes
+    gaussian = gaussian_transfer(array.k, sigma)
+    transfer = _transfer(array, kernel, of_kernel, gaussian)
 
-    transfer, changes, of_modes = array.kernel_of(i)
     r = RADII * sigma
-    profiles = array.radial(np.column_stack([transfer, changes.T]), r)
+    profiles = array.radial(np.column_stack([kernel, changes.T]), r)
     g = profiles[:, 0]
     of_g = profiles[:, 1:] @ of_modes
-    g_errors = np.linalg.norm(of_g, axis=1)
-    with_a = of_g @ of_a / np.maximum(g_errors * np.linalg.norm(of_a), TINY)
-    of_transfer = changes.T @ of_modes
-    errors = np.linalg.norm(of_transfer, axis=1)
-    gaussian = gaussian_transfer(array.k, sigma)
-    lost = RESOLVED * errors > gaussian
-    readings = array.readings
-    x = np.unique(readings.x if np.ptp(readings.x) else readings.y)
-    sampled = np.pi * (x.size - 1) / np.ptp(x)
-    resolved = float(min(array.k[np.argmax(lost) if lost.any() else -1], sampled))
-    k = round_wavenumbers(resolved)
-    at_k = np.array([np.interp(k, array.k, column) for column in (transfer, *of_transfer.T)])
-    of_gain = of_a + (at_k[1:] / at_k[0]).T
-
+    errors = np.linalg.norm(of_g, axis=1)
+    with_a = of_g @ of_a / np.maximum(errors * np.linalg.norm(of_a), TINY)
     kernel_changes = _by_source(array, of_g + np.outer(g, of_a))
     del kernel_changes["noise"]
+    k = round_wavenumbers(transfer.resolved_wavenumber)
+    at_k = np.array([np.interp(k, array.k, column) for column in (kernel, *of_kernel.T)])
+    logarithms = np.vstack([of_a, rows[1] / sigma, of_a + (at_k[1:] / at_k[0]).T])
     radii = 8 * array.film.thickness * np.linspace(0.0, 1.0, 321)
     failing = array.failing
     checks = [
@@ -75,21 +73,13 @@ def single_sensor(array: ArrayData, name: str) -> ApparatusFunction:
     return ApparatusFunction(
         plane=None,
         radial_profile=ApparatusRadial(
-            r, g, g_errors, unit_gaussian(r, sigma), of_g @ of_g.T, with_a
+            r, g, errors, unit_gaussian(r, sigma), of_g @ of_g.T, with_a
         ),
-        transfer=TransferFunction(array.k, abs(transfer), errors, np.ones_like(errors), resolved),
-        reconvolution=_reconvolution(array, i, reference * np.stack([transfer, gaussian])),
-        parameters=ParameterSet(
-            tuple(_ESTIMATED[known].tolist()),
-            values[known],
-            covariance[np.ix_(known, known)],
-            reading=array.reading,
-        ),
+        transfer=transfer,
+        reconvolution=_reconvolution(array, i, reference * np.stack([kernel, gaussian])),
+        parameters=parameters,
         checks=tuple(checks),
-        film=array.film,
-        indenter=array.indenter,
         sensor=StressSensor(name=name),
-        load=array.load,
         reference=StressProfile(
             r=radii,
             sigma_zz=array.load * array.radial(reference, radii),
@@ -97,19 +87,43 @@ def single_sensor(array: ArrayData, name: str) -> ApparatusFunction:
             film=array.film,
             indenter=array.indenter,
         ),
-        process=array.process,
-        load_cell=array.load_cell,
-        stage=array.stage,
-        user=array.user,
-        start_time=array.start_time,
-        end_time=array.end_time,
         budget={
-            str(quantity): {source: abs(float(u)) for source, u in _by_source(array, row).items()}
-            for quantity, row in zip(_ESTIMATED[:2], columns, strict=False)
+            quantity: {source: abs(float(u)) for source, u in _by_source(array, row).items()}
+            for quantity, row in zip(parameters.names, rows, strict=False)
         },
         kernel_changes=kernel_changes,
-        shared_effects=_by_source(array, np.vstack([of_a, of_sigma / sigma, of_gain])),
+        shared_effects=_by_source(array, logarithms),
+        **{field: getattr(array, field) for field in _SAME},
     )
+
+
+def _parameters(array: ArrayData, i: int) -> tuple[ParameterSet, FloatArray]:
+    """Return the numbers of a sensor, and the columns (2, c) of A and of its Gaussian's width."""
+    of_a, of_x, of_y = (part[i] for part in array.split(array.columns)[:3])
+    a = array.conversion_constants[i]
+    values = np.array([a, array.gaussian_sigmas[i], *array.centres[i], array.baselines[i]])
+    columns = np.stack([a * of_a, array.sigma_columns[i], of_x, of_y, np.zeros_like(of_a)])
+    covariance = columns @ columns.T
+    if array.baseline_uncertainties is not None:
+        covariance[-1, -1] = array.baseline_uncertainties[i] ** 2
+    # A line tells no centre across it.
+    known = np.isfinite(values)
+    names = tuple(_ESTIMATED[known].tolist())
+    covariance = covariance[np.ix_(known, known)]
+    return ParameterSet(names, values[known], covariance, reading=array.reading), columns[:2]
+
+
+def _transfer(
+    array: ArrayData, kernel: FloatArray, of_kernel: FloatArray, gaussian: FloatArray
+) -> TransferFunction:
+    """Return the transform of G, resolved up to where the Gaussian's is three uncertainties."""
+    errors = np.linalg.norm(of_kernel, axis=1)
+    lost = RESOLVED * errors > gaussian
+    readings = array.readings
+    x = np.unique(readings.x if np.ptp(readings.x) else readings.y)
+    sampled = np.pi * (x.size - 1) / np.ptp(x)
+    resolved = float(min(array.k[np.argmax(lost) if lost.any() else -1], sampled))
+    return TransferFunction(array.k, abs(kernel), errors, np.ones_like(errors), resolved)
 
 
 def _by_source(array: ArrayData, columns: FloatArray) -> Arrays:
