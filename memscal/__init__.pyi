@@ -18,6 +18,11 @@ from .deconvolution.fourier_ratio import normalise as normalise
 from .deconvolution.fourier_ratio import reconvolve as reconvolve
 from .deconvolution.widths import fit_gaussian as fit_gaussian
 from .errors import MemscalError as MemscalError
+from .extensions.arrays.calibrate_array import ArrayCalibration as ArrayCalibration
+from .extensions.arrays.calibrate_array import calibrate_array as calibrate_array
+from .extensions.arrays.contacts import Contacts as Contacts
+from .extensions.arrays.sensor_array import SensorArray as SensorArray
+from .extensions.arrays.sensor_array import load_array as load_array
 from .extensions.fleet.many import FleetCalibration as FleetCalibration
 from .extensions.fleet.many import calibrate_many as calibrate_many
 from .extensions.history.history import History as History

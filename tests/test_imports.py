@@ -13,10 +13,13 @@ import memscal
 
 SCAN = str(SHIPPED / "rod_scan_65.h5")
 NOT_PUBLIC = {
+    "ArrayReadings",
     "BudgetComparison",
     "FilmField",
     "Holds",
     "InputEffect",
+    "JointFit",
+    "KernelModes",
     "LawComparison",
     "NoiseSpectrum",
     "OtherEstimate",
@@ -25,6 +28,7 @@ NOT_PUBLIC = {
     "ScanPoints",
     "SetUp",
     "Solution",
+    "Stream",
     "StressComparison",
     "Wave",
 }
