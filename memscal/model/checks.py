@@ -111,24 +111,24 @@ joint_chi_square: all loads of a kind against one friction coefficient, chi-squa
     friction changes with the load: see each coefficient, or --interface
 lubricated_frictionless: lubricated loads against no friction: rise of -2 ln p
     more friction than counted, or a wrong A, load or thickness: doubt the dry ones
-dead_taxels: sensors of an array without a signal
-    they are left out: press on them, look at their wiring
-ends_covered: what the scan of an array lacks of two thicknesses beyond the last sensor
+dead_taxels: sensors without a signal
+    left out: press on them, look at their wiring
+ends_covered: what a scan lacks of two thicknesses beyond the last sensor
     scan farther
 layout: centres of sensors against their layout
     sensors lie elsewhere, or names are mixed up
 crosstalk_identified: median u of the crosstalk by the readings alone
     scan a raster, take a common shape, or a thinner film
 crosstalk_model: A and crosstalk by a common against own shapes, in u
-    take own shapes, of a raster
+    own shapes, of a raster
 common_kernel: fall of chi-square by widths of the sensors' own
-    take own shapes, of a raster
+    own shapes, of a raster
 array_chi_square: residuals of the worst sensor against the noise
     look at reference, farther pairs, drift, memory of the film
-press_errors: what errors of place and load common to a press explain, over chance
+press_errors: what common errors of place and load explain, over chance
     state x_errors and normal_load_errors
 common_mode: noise that two sensors share against that of their board
-    state boards; look for presses that are wrong for several
+    state boards
 """
 _ENTRIES = re.findall(r"(\w+): (.*)\n +(.*)\n", _EXPLAINED)
 EXPLANATIONS: dict[str, tuple[str, str]] = {name: (tests, cure) for name, tests, cure in _ENTRIES}
