@@ -13,7 +13,7 @@ from memscal.extensions.arrays.array_data import ArrayData
 from memscal.extensions.arrays.array_numbers import array_numbers
 from memscal.extensions.arrays.joint_fit import JointFit
 from memscal.extensions.arrays.presses import Sorted, fitted_layout
-from memscal.model.arrays import BoolArray, IndexArray
+from memscal.model.arrays import BoolArray, IndexArray, slices
 from memscal.model.checks import (
     FALSE_ALARM,
     Message,
@@ -33,6 +33,8 @@ _LEAST_APART = 0.5
 #: A scan reaches beyond the last sensor by so many thicknesses of the film, or a little less.
 _BEYOND = 2.0
 _SHORT = 0.1
+#: Presses whose covariances are held at once.
+_PRESSES = 500
 
 
 class Failing(NamedTuple):
@@ -265,10 +267,13 @@ def _chi_square(fit: JointFit, array: ArrayData) -> Failing:
 def _press_errors(fit: JointFit) -> Failing:
     """Test whether readings of one press share errors of place and load that are not counted."""
     errors = fit.model.press_errors(fit.state)
-    covariance = fit.noise.covariance + np.einsum("cit,cjt->tij", errors, errors)
     patterns = np.moveaxis(fit.model.by_press(fit.state), (0, 2), (2, 0))
     residual = fit.residual.T[:, :, None]
-    weighted = np.linalg.solve(covariance, patterns)
+    weighted = np.empty(patterns.shape)
+    for some in slices(len(patterns), _PRESSES):
+        of_press = errors[..., some]
+        covariance = fit.noise.covariance + np.einsum("cit,cjt->tij", of_press, of_press)
+        weighted[some] = np.linalg.solve(covariance, patterns[some])
     size = np.sum(patterns * weighted, axis=1)
     explained = np.sum(residual * weighted, axis=1) ** 2 / np.where(size > 0, size, 1.0)
     ratios = explained.mean(axis=0)

@@ -25,7 +25,8 @@ class ArrayNumbers:
     of_centres: FloatArray  # (2, m, c)
     of_crosstalk: FloatArray  # (m, m, c)
     kernels: FloatArray  # (1 or m, nodes): transforms of G
-    of_kernels: FloatArray  # (1 or m, nodes, c)
+    changes: FloatArray  # (1 or m, nodes, c): of these before they are divided by their integrals
+    of_total: FloatArray  # (1 or m, c): of the integrals, relative
 
 
 def array_numbers(fit: JointFit, posterior: Posterior, columns: FloatArray) -> ArrayNumbers:
@@ -46,15 +47,16 @@ def array_numbers(fit: JointFit, posterior: Posterior, columns: FloatArray) -> A
     of_total = integrals / total[:, None]
     centres = np.zeros((2, m, columns.shape[1]))
     centres[list(model.presses.axes)] = taken(columns, layout.centres)
-    transfer = kernels / total[:, None]
-    of_transfer = changes / total[:, None, None] - transfer[:, :, None] * of_total[:, None]
+    # In place: these are hundreds of megabytes of a large array of own shapes.
+    changes /= total[:, None, None]
     return ArrayNumbers(
         np.log(fit.state.gain) + np.log(total),
         taken(columns, layout.gains) + of_total,
         centres,
         taken(columns, layout.crosstalk),
-        transfer,
-        of_transfer,
+        kernels / total[:, None],
+        changes,
+        of_total,
     )
 
 
@@ -67,7 +69,8 @@ def kernel_modes(fit: JointFit, numbers: ArrayNumbers) -> tuple[KernelModes, Flo
     owners = []
     sizes = []
     alike = len(numbers.kernels) == 1
-    for j, change in enumerate(numbers.of_kernels):
+    for j, kernel in enumerate(numbers.kernels):
+        change = numbers.changes[j] - kernel[:, None] * numbers.of_total[j]
         left, size, right = np.linalg.svd(seen[:, None] * change, full_matrices=False)
         count = min(_MOST_MODES, int(np.sum(size > _SMALLEST * size[0])))
         changes.append((left[:, :count] / seen[:, None] * size[0]).T)
