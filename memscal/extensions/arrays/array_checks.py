@@ -99,7 +99,8 @@ def _of_all(array: ArrayData, found: Sorted) -> Iterator[Failing]:
         ),
         np.flatnonzero(array.used)[short > _SHORT],
     )
-    if array.layout is not None and array.used.sum() > 2 and not array.on_a_line:
+    planar = not np.isnan(array.centres[array.used]).any()
+    if array.layout is not None and planar and array.used.sum() > 2:
         yield _layout(array)
 
 

@@ -252,6 +252,9 @@ def _presses(
         errors = np.ravel(scan.normal_load_errors) / loads
     keep = found.keep & np.isfinite(loads)
     x_errors = np.zeros(scan.x.size) if scan.x_errors is None else scan.x_errors
+    if scan.kind == "repeats" and not scan.position_errors_by_repeat:
+        # An error that all repeats share is not less in their mean.
+        x_errors = x_errors * np.sqrt(scan.shape[0])
     axes = (0, 1) if single.planar else ((0,) if single.direction == "x" else (1,))
     passes = scan.passes.ravel()
     if np.bincount(passes).min() < MINIMUM_POSITIONS:
@@ -277,6 +280,7 @@ def _presses(
         load_errors=np.where(np.isfinite(errors), errors, 0.0),
         board=np.unique(board, return_inverse=True)[1],
         stated=None if stated is None else stated.reshape(u.shape),
+        averaging=scan.averaging_length or 0.0,
     )
 
 

@@ -41,6 +41,8 @@ WIDEST = SPREADS[-1]
 OWN_WIDTH = 0.05
 _OWN_SHAPE = 0.05
 _FIRST_ROUNDS = 3
+#: Points of a mean along the scan.
+_NODES = 8
 _MOST_ROUNDS = 12
 #: A sensor's own noise is at least this share of its variance, and of its largest reading.
 _LEAST_OWN = 0.02
@@ -189,7 +191,22 @@ def fit_array(
 ) -> JointFit:
     """Fit an array from a start; the noise is that of the residuals."""
     first = fit_shape(model, state, noise, gaussian, forward, _FIRST_ROUNDS)
-    return fit_shape(model, first.state, noise_of(model, first.state), gaussian, forward)
+    if model.presses.averaging:
+        model = _at_positions(model, first.state)
+    noise = noise_of(model, first.state)
+    return fit_shape(model, first.state, noise, gaussian, forward)
+
+
+def _at_positions(model: JointModel, state: ArrayState) -> JointModel:
+    """Take off what a mean along the scan adds to each reading, by what is predicted nearby."""
+    presses = model.presses
+    change = model.predicted(state)
+    for node, weight in zip(*np.polynomial.legendre.leggauss(_NODES), strict=True):
+        centres = state.centres.copy()
+        centres[:, presses.axes[0]] -= node / 2 * presses.averaging
+        change -= weight / 2 * model.predicted(replace(state, centres=centres))
+    u = np.where(presses.keep, presses.u + change, 0.0)
+    return replace(model, presses=replace(presses, u=u))
 
 
 def fit_shape(

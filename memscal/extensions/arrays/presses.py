@@ -31,6 +31,7 @@ class Presses:
     load_errors: FloatArray  # (t,): of each load, over it
     board: IndexArray  # (m,): whose electronics a sensor shares
     stated: FloatArray | None = None  # (m, t): stated noise, in V
+    averaging: float = 0.0  # way along the scan over which each reading is the mean, in m
 
     @property
     def used(self) -> BoolArray:

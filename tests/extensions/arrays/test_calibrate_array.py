@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from helpers.true_arrays import Errors, simulated_scan
+from scipy.interpolate import CubicSpline
 
 import memscal
 from memscal.errors import FitError, InputError, MemscalError
@@ -102,6 +103,32 @@ def test_wrong_layouts_and_unstated_errors_of_presses_fail_their_checks():
     unstated = replace(jitter, x_errors=None, normal_load=None, normal_load_errors=None)
     checks = memscal.calibrate_array(unstated).checks
     assert "press_errors" in [check.name for check in checks if not check.passed]
+
+
+def test_means_along_the_scan_are_brought_to_their_places():
+    scan = simulated_scan(1, 4, seed=1, errors=Errors(noise=0.001))[0]
+    length = 0.5e-3
+    profile = CubicSpline(scan.x, scan.u_zz, axis=1)
+    shifts = np.linspace(-0.5, 0.5, 41) * length
+    mean = np.mean([profile(scan.x + shift) for shift in shifts], axis=0)
+    a, unstated, stated = (
+        memscal.calibrate_array(
+            replace(scan, u_zz=u, averaging_length=d)
+        ).array.conversion_constants
+        for u, d in ((scan.u_zz, None), (mean, None), (mean, length))
+    )
+    assert np.all(unstated / a - 1 > 5e-3)
+    assert np.all(abs(stated / a - 1) < 1.5e-3)
+
+
+def test_a_line_along_y_tells_no_x():
+    scan = simulated_scan(1, 4, seed=1)[0]
+    turned = replace(scan, direction="y", layout=scan.layout[:, ::-1])
+    calibration = memscal.calibrate_array(turned)
+    plain = memscal.calibrate_array(scan).array
+    assert calibration.passed
+    assert np.isnan(calibration.array.centres[:, 0]).all()
+    assert np.allclose(calibration.array.centres[:, 1], plain.centres[:, 0])
 
 
 def refused_scans():
