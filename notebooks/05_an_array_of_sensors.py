@@ -73,11 +73,13 @@ calibration.plot()
 
 # %% [markdown]
 # Arrows (a) are the centres' offsets from the layout, enlarged. No estimate of a contact is better
-# than the bounds (e, f): they are small between the sensors, and grow outside. Check, in this order:
+# than the bounds (e, f): they are small between the sensors, and grow outside.
+#
+# Check, in this order:
 #
 # - **`crosstalk_identified`**: is the crosstalk known at all? On a line of sensors closer than the
-#   film is thick it is not, unless all have the same G. Where this fails, A has the uncertainty that
-#   this costs, and the crosstalk is not printed;
+#   film is thick it is not, unless all have the same G. Where this fails, A has the uncertainty
+#   that this costs, and the crosstalk is not printed;
 # - **`dead_taxels`**: which sensors are left out;
 # - **`layout`**: are the centres where the sensors were built?
 #
@@ -176,8 +178,8 @@ frames = np.concatenate(records)
 print(frames.dtype.names)
 
 # %% [markdown]
-# What a moving average of 10 s would make of the same frames stands beside it: it follows the drift,
-# and takes a contact that stays for drift as well.
+# What a moving average of 10 s would make of the same frames stands beside it: it follows the
+# drift, and takes a contact that stays for drift as well.
 
 # %%
 width = 10 * RATE
@@ -188,7 +190,8 @@ naive = array.locate((played[width:] - average)[::5], shear=0.0)
 held = (t > 100) & (t < 170)
 stated = np.sqrt(frames["covariance"][:, 2, 2])
 fig, axes = plt.subplots(1, 2)
-axes[0].plot(t[width::5], np.nan_to_num(naive.force), ".", ms=2, color="0.7", label="moving average")
+averaged = np.nan_to_num(naive.force)
+axes[0].plot(t[width::5], averaged, ".", ms=2, color="0.7", label="moving average")
 axes[0].plot(t, frames["force"], ".", ms=1, label="stream")
 axes[0].plot(t, force, "k", lw=1, label="truth")
 axes[0].set(xlabel="time (s)", ylabel="force (N)", ylim=(-0.1, 0.7))
@@ -210,8 +213,9 @@ print(f"false contacts: {touched[t < 40].sum()} before, {touched[t > 171.2].sum(
 # without a contact. Creep of the film is not drift of the baselines: it follows the force, and the
 # stream cannot tell it from force.
 #
-# The flags say what else is to be known of a frame: readings that are missing or saturated, contacts
-# outside the sensors, sensors that are left out, and frames that one contact does not explain.
+# The flags say what else is to be known of a frame: readings that are missing or saturated,
+# contacts outside the sensors, sensors that are left out, and frames that one contact does not
+# explain.
 
 # %%
 for flag in stream.Flag:
