@@ -152,13 +152,12 @@ class Stream:
         self._noise = array.noise[np.ix_(self._sensors, self._sensors)]
         peak = array.load * self._grid[:, -1].max()
         self._unknown = (_UNKNOWN * peak) ** 2
-        own = peak * _STRENGTHS
-        common = _COMMON * own
+        walks = peak * np.multiply.outer([_COMMON, 1.0], _STRENGTHS)
         if drift is not None:
-            common, own = floats(drift)[:, None]
+            walks = floats(drift)[:, None]
+        common, own = walks[..., None, None] ** 2 * self._length / rate
         n = self._sensors.size
-        variances = np.square([common, own])[..., None, None] * self._length / rate
-        self._walk = variances[0] + variances[1] * np.eye(n)
+        self._walk = common + own * np.eye(n)
         self._now = SimpleNamespace(
             frames=np.array(0),
             last=np.zeros(n),
@@ -229,8 +228,7 @@ class Stream:
             If the state is not of such a stream.
         """
         now = vars(self._now)
-        shapes = {name: np.shape(value) for name, value in state.items()}
-        if shapes != {name: value.shape for name, value in now.items()}:
+        if any(np.shape(state.get(name, [[]])) != value.shape for name, value in now.items()):
             raise InputError("The state is not of a stream of this array and these arguments.")
         for name, value in now.items():
             value[...] = state[name]
@@ -277,20 +275,19 @@ class Stream:
             records["chi2"][frames] = fit.chi2
             rows = frames[fit.rows]
             records["contact"][rows] = True
-            records["x"][rows] = fit.place[:, 0]
-            records["y"][rows] = fit.place[:, 1]
+            records["x"][rows], records["y"][rows] = fit.place.T
             records["force"][rows] = fit.force
             # Of force times place, and of force; then of place.
             force = fit.force[:, None, None]
             shares = [self._errors_at(node)[1] for node in fit.node]
             total = fit.covariance + np.reshape(shares, fit.covariance.shape) * force**2
-            limit = _MISFIT * fit.force**2 / total[:, -1, -1]
+            explained = fit.force**2 / total[:, -1, -1]
+            limit = np.maximum(chdtri(freedom, FALSE_ALARM), _MISFIT * explained)
             total[:, :-1] /= force
             total[..., :-1] /= force
             records["covariance"][np.ix_(rows, self._told, self._told)] = total
-            limit = np.maximum(limit, chdtri(freedom, FALSE_ALARM))
-            records["flags"][rows] |= FrameFlag.TWO_CONTACTS * (fit.chi2[fit.rows] > limit)
-            records["flags"][rows] |= FrameFlag.EDGE * (self._seeking.outside(fit.place) > 0)
+            two = FrameFlag.TWO_CONTACTS * (fit.chi2[fit.rows] > limit)
+            records["flags"][rows] |= two + FrameFlag.EDGE * (self._seeking.outside(fit.place) > 0)
 
     def _slopes(self, place: FloatArray, force: FloatArray | float) -> FloatArray:
         """Return changes of readings by force times x (and y), and by force, (m, c, n)."""
