@@ -104,9 +104,12 @@ def sorted_readings(scan: Scan, places: FloatArray, u: FloatArray) -> Sorted:
         top = places[:, inside[np.argmax(abs(values - np.median(values)))]]
         distance = np.hypot(*(places[:, inside] - top[:, None]))
         count = max(int(_OUTERMOST * inside.size), _FEWEST)
-        outermost = values[np.argsort(distance)[-count:]]
-        baseline = np.median(outermost)
-        numbers[:, i] = np.sort(values)[-3] - baseline, baseline, outermost.std()
+        outermost = np.argsort(distance)[-count:]
+        # A drift across the scan is no peak.
+        columns = np.vstack([np.ones(inside.size), places[:, inside]]).T
+        level = values - columns @ np.linalg.lstsq(columns, values)[0]
+        peak = np.sort(level)[-3] - np.median(level[outermost])
+        numbers[:, i] = peak, np.median(values[outermost]), level[outermost].std()
         clipped = inside[_clipped(values, numbers[2, i])]
         if scan.reading_high is None and clipped.size:
             keep[i, clipped] = False
