@@ -9,8 +9,8 @@ per newton of a contact at r:
     P \leftarrow P + Q, \quad S = P + R, \quad e = \bar u - b, \quad
     z(r) = \frac{H^T S^{-1} e}{\sqrt{H^T S^{-1} H}}
 
-A contact is there if z exceeds 5 at a node of a grid of places.  With J = [H_x, H_y, H] at its
-place, and M = S^-1 without a contact,
+A frame has a contact if z exceeds 6 at a node of a grid of places; that of a block is kept out of
+the baselines from 3.5 on.  With J = [H_x, H_y, H] at its place, and M = S^-1 without a contact,
 
 .. math::
 
@@ -37,7 +37,6 @@ from scipy.special import chdtri
 from memscal.errors import InputError
 from memscal.extensions.arrays.array_data import ArrayData
 from memscal.extensions.arrays.locate import (
-    DETECTED,
     Seeking,
     Touch,
     at_an_end,
@@ -65,7 +64,9 @@ _PATIENCE = 1.1
 _MARGIN = 1.0
 _STEP = 0.5
 _STEPS = 3
-#: Significance at which a block's contact is kept out of the baselines: sooner than it is reported.
+#: Significance at which a frame has a contact, which noise alone has in one of ten million, and at
+#: which that of a block is kept out of the baselines: long before it is seen in a frame.
+_FOUND = 6.0
 _SPARED = 3.5
 #: Random walks of single sensors in 1 s, over the array's largest reading; the common one over it.
 #: The first holds until the readings tell.
@@ -271,7 +272,7 @@ class Stream:
                 records["force"][frames] = np.nan
                 continue
             weight = floats(np.linalg.inv(covariance + self._unknown * np.diag(~seen)))
-            fit = self._fit(np.where(seen, deviations[frames], 0.0), weight, DETECTED)
+            fit = self._fit(np.where(seen, deviations[frames], 0.0), weight, _FOUND)
             records["chi2"][frames] = fit.chi2
             rows = frames[fit.rows]
             records["contact"][rows] = True
