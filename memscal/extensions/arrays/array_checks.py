@@ -33,6 +33,8 @@ _LEAST_APART = 0.5
 #: A scan reaches beyond the last sensor by so many thicknesses of the film, or a little less.
 _BEYOND = 2.0
 _SHORT = 0.1
+#: Standard uncertainty of a layout that states none, over the least distance.
+_UNSTATED = 0.03
 #: Presses whose covariances are held at once.
 _PRESSES = 500
 
@@ -112,7 +114,12 @@ def _layout(array: ArrayData) -> Failing:
     left = np.hypot(*(array.centres[used] - fitted).T)
     n = len(array.sensors)
     variances = array.uncertainties()[n : 3 * n].reshape(2, n)[:, used] ** 2
-    variance = variances.mean(axis=0) + (array.layout_uncertainty or 0.0) ** 2
+    stated = array.layout_uncertainty
+    if stated is None:
+        apart = array.layout[used][:, None] - array.layout[used]
+        distance = np.hypot(apart[..., 0], apart[..., 1])
+        stated = _UNSTATED * distance[distance > 0].min()
+    variance = variances.mean(axis=0) + stated**2
     squares = left**2 / variance
     degrees = 2 * used.size - 4
     return Failing(
