@@ -219,6 +219,10 @@ class SensorArray(ArrayData, Shown, Gridded):
         A frame is judged by the baselines at the end of the last block.  However a stream is cut
         into what is pushed, its records are the same but for rounding.
 
+        A frame has a contact from six standard deviations on: where weak ones matter, average
+        frames before they are pushed.  Readings that are rounded so coarsely that a sound sensor
+        does not change for 1 s are taken for stuck.
+
         Parameters
         ----------
         rate : float
