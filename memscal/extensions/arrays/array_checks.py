@@ -21,6 +21,7 @@ from memscal.model.checks import (
     check,
     chi_square_limit,
     override_messages,
+    uncertainty_unstated_messages,
 )
 from memscal.model.scan import Scan
 
@@ -344,5 +345,9 @@ def array_messages(
             f"Crosstalk is {values.mean():.2%} on the mean (u {of_mean:.2%}); without any the "
             f"probability of as much is p = {p_value:.2g}.",
         )
+    stated = prepared.scans[0]
+    owners = {"load": stated, "thickness": stated.set_up.film, "radius": stated.set_up.indenter}
+    known = {name: getattr(of, f"{name}_uncertainty") for name, of in owners.items()}
+    yield from uncertainty_unstated_messages(known)
     if scan.synthetic is not None:
         yield Message("synthetic", "The scan is synthetic: its truth is stored in it.")
