@@ -153,6 +153,6 @@ def test_what_is_wrong_with_one_sensor_moves_no_other(check):
         if check:
             assert ill.array.failing[check] == ("T04",)
         assert np.array_equal(ill.used, others) == (check == "dead_taxels")
-        _, u = well.of_ratios
+        _, u = well.of_constants
         moved = ill.array.conversion_constants / well.array.conversion_constants - 1
-        assert np.all(abs(moved[others]) < 2 * u[others])
+        assert np.all(abs(moved[others]) < 0.75 * u[others])
