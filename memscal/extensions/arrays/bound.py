@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from memscal.errors import InputError
 from memscal.extensions.arrays.array_data import ArrayData
-from memscal.extensions.arrays.locate import Seeking, Sight, Touch, steps
+from memscal.extensions.arrays.locate import Seeking, Touch, steps
 from memscal.model.arrays import FloatArray, floats
 
 
@@ -22,11 +22,9 @@ def bound(
 ) -> FloatArray:
     """Covariance of x, y and force by the noise, (m, 3, 3): :meth:`SensorArray.bound`."""
     seeking = replace(Seeking.on(array, indenter, shear), near=np.inf)
-    state = states(places, force, 0.0)
-    sight = Sight.of(seeking, array.noise, np.ones(seeking.fields.sensors.size, bool))
-    residual, slopes = sight.rows(np.zeros(1), state)
-    _, inverse = steps(residual, slopes, np.zeros(len(state)))
-    return sight.covariance(inverse)
+    residual, slopes = seeking.rows(np.zeros(1), states(places, force, 0.0))
+    _, inverse = steps(residual, slopes)
+    return seeking.covariance(inverse)
 
 
 def predict(

@@ -17,6 +17,8 @@ does.  A last step weighs the readings by their noise and the array's own errors
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
+from itertools import compress
 from typing import Any
 
 import numpy as np
@@ -50,25 +52,21 @@ DETECTED = 5.0
 _STEP = 0.25
 _STARTS = 3
 _BATCH = 200
-#: Places of the grid that the sensors hardly see are left out.
+#: Places of the grid count less where the sensors see a smaller share of what they see at most.
 _SEEN = 1e-3
-#: Steps of a fit; its damping at first, where it gives up, and by what factors it changes; the rise
-#: of chi-square that is left where it has settled.
-_STEPS = 60
+#: Steps of a fit; its damping at first, and by what factors it changes.
+_STEPS = 30
 _DAMPING = 1e-3
-_STUCK = 1e8
 _LESS = 0.2
 _MORE = 5.0
-_SETTLED = 1e-6
 #: Sensors lie on a line if they are apart from it by less of the film's thickness.
 _ON_A_LINE = 0.1
 #: Prior standard deviations of the distance from the sensors' box, in thicknesses, and of ln force,
 #: by which starts are compared: by little noise a huge force far outside is as likely as a contact.
 _OUTSIDE = 0.5
 _FORCES = 1.5
-#: Forces are above this, in N; what is fixed has this standard deviation, in SI units.
+#: Forces are above this, in N.
 _LEAST = 1e-9
-_FIXED = 1e-12
 #: A force of a larger relative uncertainty is weak.
 _WEAK = 0.2
 
@@ -78,7 +76,10 @@ Touch = str | RoundIndenter
 
 @array_record
 class Seeking:
-    """How contacts are sought: fields, which of x and y they tell, and the region in m."""
+    """How contacts are sought: fields, which of x and y they tell, the region in m, the noise.
+
+    States (m, 5) are rows of x, y, force, and the shears over it in units of their prior.
+    """
 
     fields: Any  # ReceptiveFields, or MeasuredFields
     axes: list[int]  # which of x and y the sensors tell; the other one is that of the row
@@ -87,6 +88,7 @@ class Seeking:
     high: FloatArray
     thickness: float
     near: float  # prior standard deviation of the distance from the sensors' box, in m
+    whitener: FloatArray  # (s, n): makes white what s of the n sensors read
 
     @classmethod
     def on(cls, array: ArrayData, indenter: Touch, shear: float, margin: float = MARGIN) -> Seeking:
@@ -118,6 +120,7 @@ class Seeking:
             high=fields.centres.max(axis=0) + beyond,
             thickness=h,
             near=_OUTSIDE * h,
+            whitener=_whitener(array.noise, fields.sensors, fields.sensors),
         )
 
     def grid(self, step: float = _STEP) -> FloatArray:
@@ -135,128 +138,111 @@ class Seeking:
         centres = self.fields.centres
         return places - np.clip(places, centres.min(axis=0), centres.max(axis=0))
 
+    def contact(self, state: FloatArray) -> ArrayTriple:
+        """Return places, forces and shears over forces of states."""
+        return state[:, :2], state[:, 2], self.shear * state[:, 3:]
 
-@array_record
-class Sight:
-    """What the same s sensors read in some frames: their noise made white."""
-
-    seeking: Seeking
-    kept: BoolArray  # (n,)
-    whitener: FloatArray  # (s, s)
-
-    @classmethod
-    def of(cls, seeking: Seeking, noise: FloatArray, kept: BoolArray) -> Sight:
-        """Return the sight of some of the n sensors, in noise of all of the array."""
-        some = seeking.fields.sensors[kept]
-        root = np.linalg.cholesky(noise[np.ix_(some, some)])
-        return cls(seeking, kept, floats(np.linalg.inv(root)))
-
-    def starts(self, u: FloatArray, grid: FloatArray, fields: FloatArray) -> FloatArray:
-        """Return the best places of frames (m, s), (m, 3, 2); NaN where no contact is seen."""
-        tuned = fields[:, self.kept] @ self.whitener.T
+    def starts(
+        self, u: FloatArray, grid: FloatArray, fields: FloatArray
+    ) -> tuple[BoolArray, FloatArray]:
+        """Return in which frames (m, s) a contact is seen, and three states of each to begin at."""
+        tuned = fields @ self.whitener.T
         size = np.linalg.norm(tuned, axis=1)
-        seen = size > _SEEN * size.max()
-        places = grid[seen]
-        score = u @ (tuned[seen] / size[seen, None]).T
-        detected = score.max(axis=1) > DETECTED
-        starts = np.full((len(u), _STARTS, 2), np.nan)
+        size = np.maximum(size, _SEEN * size.max())
+        score = u @ (tuned / size[:, None]).T
+        seen = score.max(axis=1) > DETECTED
+        score = score[seen]
+        states = np.zeros((len(score), _STARTS, 5))
         for i in range(_STARTS):
-            best = places[score.argmax(axis=1)]
-            starts[detected, i] = best[detected]
-            apart = np.linalg.norm(places - best[:, None], axis=-1)
-            score[apart < self.seeking.thickness] = -np.inf
-        return starts
+            best = score.argmax(axis=1)
+            states[:, i, :2] = grid[best]
+            states[:, i, 2] = np.maximum(score.max(axis=1) / size[best], _LEAST)
+            apart = np.linalg.norm(grid - grid[best, None], axis=-1)
+            score[apart < self.thickness] = -np.inf
+        return seen, states
 
     def fitted(self, u: FloatArray, starts: FloatArray) -> FloatArray:
-        """Return the state of least chi-square of frames (m, s), (m, 5)."""
-        several = starts.shape[1]
-        u = np.repeat(u, several, axis=0)
-        state = np.zeros((len(u), 5))
-        state[:, :2] = starts.reshape(-1, 2)
-        state[:, 2] = 1.0
-        fields = u - self.rows(u, state)[0][:, : u.shape[1]]
-        force = np.sum(fields * u, axis=1) / np.sum(fields**2, axis=1)
-        state[:, 2] = np.maximum(force, _LEAST)
-        cost = self._settle(u, state)
-        # Of contacts that are as likely the one of a more usual force is taken.
-        cost += (np.log(state[:, 2] / self.seeking.fields.array.load) / _FORCES) ** 2
-        best = cost.reshape(-1, several).argmin(axis=1)
-        return floats(state.reshape(-1, several, 5)[np.arange(best.size), best])
-
-    def _settle(self, u: FloatArray, state: FloatArray) -> FloatArray:
-        """Move states (m, 5) to their least chi-square by damped Gauss-Newton steps; return it."""
+        """Return the state of least chi-square of frames (m, s), by damped Gauss-Newton steps."""
+        u = np.repeat(u, _STARTS, axis=0)
+        state = starts.reshape(-1, 5)
         damping = np.full(len(state), _DAMPING)
         residual, slopes = self.rows(u, state)
-        cost = np.sum(residual**2, axis=1)
-        active = np.arange(len(state))
         for _ in range(_STEPS):
-            step, _ = steps(residual[active], slopes[active], damping[active])
-            trial = state[active] + step
-            trial[:, :2] = np.clip(trial[:, :2], self.seeking.low, self.seeking.high)
-            trial[:, 2] = np.maximum(trial[:, 2], _LEAST)
-            there, bent = self.rows(u[active], trial)
-            fall = cost[active] - np.sum(there**2, axis=1)
-            better = fall >= 0
-            damping[active] *= np.where(better, _LESS, _MORE)
-            good = active[better]
-            state[good] = trial[better]
-            residual[good] = there[better]
-            slopes[good] = bent[better]
-            cost[good] -= fall[better]
-            settled = better & (fall < _SETTLED) & (damping[active] < 1)
-            active = active[~settled & (damping[active] < _STUCK)]
-            if not active.size:
-                break
-        return floats(cost)
+            step, _ = steps(residual, slopes, damping)
+            trial = self.moved(state, step)
+            there, bent = self.rows(u, trial)
+            better = np.sum(there**2, axis=1) < np.sum(residual**2, axis=1)
+            damping *= np.where(better, _LESS, _MORE)
+            state[better] = trial[better]
+            residual[better] = there[better]
+            slopes[better] = bent[better]
+        # Of contacts that are as likely the one of a more usual force is taken.
+        unusual = np.log(state[:, 2] / self.fields.array.load) / _FORCES
+        cost = np.sum(residual**2, axis=1) + unusual**2
+        best = cost.reshape(-1, _STARTS).argmin(axis=1)
+        return floats(state.reshape(-1, _STARTS, 5)[np.arange(best.size), best])
 
     def judged(self, u: FloatArray, state: FloatArray) -> ArrayTriple:
         """Return states, covariances (m, 3, 3) and p-values by noise and the array's errors."""
         residual, slopes = self.rows(u, state)
-        of_array = self.whitener @ self.seeking.fields.errors(*_parts(state))[:, self.kept]
+        errors = self.whitener @ self.fields.errors(*self.contact(state))
         s = u.shape[1]
-        root = np.linalg.cholesky(np.eye(s) + of_array @ of_array.swapaxes(1, 2))
+        root = np.linalg.cholesky(np.eye(s) + errors @ errors.swapaxes(1, 2))
         both = np.concatenate([residual[..., None], slopes], axis=-1)
         both[:, :s] = np.linalg.solve(root, both[:, :s])
         residual, slopes = both[..., 0], both[..., 1:]
-        step, inverse = steps(residual, slopes, np.zeros(len(u)))
-        moved = state + step
-        moved[:, :2] = np.clip(moved[:, :2], self.seeking.low, self.seeking.high)
-        square = np.sum(residual**2, axis=1) - np.einsum("mrf,mr,mf->m", slopes, residual, step)
-        freedom = s - len(self.seeking.axes) - 1
-        p_value = chdtrc(freedom, square) if freedom else np.full(len(u), np.nan)
-        return moved, self.covariance(inverse), floats(p_value)
+        step, inverse = steps(residual, slopes)
+        square = np.sum((residual - np.einsum("mrf,mf->mr", slopes, step)) ** 2, axis=1)
+        # Of as many readings as there are unknowns chi-square says nothing.
+        p_value = chdtrc((s - len(self.axes) - 1) or np.nan, square)
+        return self.moved(state, step), self.covariance(inverse), floats(p_value)
 
     def covariance(self, inverse: FloatArray) -> FloatArray:
         """Return covariances (m, 3, 3) of x, y and force; NaN where the sensors do not tell."""
-        untold = [i for i in (0, 1) if i not in self.seeking.axes]
-        covariance = inverse[:, :3, :3].copy()
-        covariance[:, untold] = np.nan
-        covariance[:, :, untold] = np.nan
+        told = np.array([*self.axes, 2])
+        covariance = np.full((len(inverse), 3, 3), np.nan)
+        covariance[:, told[:, None], told] = inverse[:, : told.size, : told.size]
         return covariance
+
+    def moved(self, state: FloatArray, step: FloatArray) -> FloatArray:
+        """Return states after a step, in the region and with a force above zero."""
+        moved = state.copy()
+        moved[:, self._free] += step
+        moved[:, :2] = np.clip(moved[:, :2], self.low, self.high)
+        moved[:, 2] = np.maximum(moved[:, 2], _LEAST)
+        return moved
 
     def rows(self, u: FloatArray, state: FloatArray) -> ArrayPair:
         """Return residuals (m, s + 4) of standard deviation one, and derivatives of what they miss.
 
         The last four are those of the priors: places near the box of the sensors, small shears.
         """
-        seeking = self.seeking
-        value, slopes = seeking.fields.forward(*_parts(state))
-        away = np.column_stack([seeking.beyond(state[:, :2]), state[:, 3:]])
-        weight = np.full(away.shape, 1 / max(seeking.shear, _FIXED))
-        weight[:, :2] = np.where(away[:, :2], 1 / seeking.near, 0.0)
-        weight[:, [i for i in (0, 1) if i not in seeking.axes]] = 1 / _FIXED
-        read = u - value[:, self.kept] @ self.whitener.T
+        value, slopes = self.fields.forward(*self.contact(state))
+        slopes[..., 3:] *= self.shear
+        away = np.column_stack([self.beyond(state[:, :2]) / self.near, state[:, 3:]])
+        weight = np.ones_like(away)
+        weight[:, :2] = (away[:, :2] != 0) / self.near
         prior = weight[..., None] * np.eye(5)[[0, 1, 3, 4]]
-        slopes = np.concatenate([self.whitener @ slopes[:, self.kept], prior], axis=1)
-        return np.concatenate([read, -weight * away], axis=1), slopes
+        slopes = np.concatenate([self.whitener @ slopes, prior], axis=1)
+        residual = np.concatenate([u - value @ self.whitener.T, -away], axis=1)
+        return residual, floats(slopes[..., self._free])
+
+    @property
+    def _free(self) -> list[int]:
+        return [*self.axes, 2, 3, 4]
 
 
-def steps(residual: FloatArray, slopes: FloatArray, damping: FloatArray) -> ArrayPair:
+def _whitener(noise: FloatArray, sensors: IndexArray, read: IndexArray) -> FloatArray:
+    """Return what makes white the noise of some of the sensors; what others read has no weight."""
+    root = np.linalg.cholesky(noise[np.ix_(read, read)])
+    return floats(np.linalg.solve(root, np.equal.outer(read, sensors)))
+
+
+def steps(residual: FloatArray, slopes: FloatArray, damping: FloatArray | float = 0.0) -> ArrayPair:
     """Return damped Gauss-Newton steps (m, f) of rows, and inverses of the normal equations."""
-    size = np.linalg.norm(slopes, axis=1)
-    scaled = slopes / size[:, None]
-    normal = scaled.swapaxes(1, 2) @ scaled + damping[:, None, None] * np.eye(size.shape[1])
-    inverse = np.linalg.inv(normal) / (size[:, :, None] * size[:, None])
+    normal = slopes.swapaxes(1, 2) @ slopes
+    more = np.reshape(damping, (-1, 1, 1)) * np.eye(normal.shape[1])
+    inverse = np.linalg.inv(normal * (1 + more))
     return np.einsum("mfg,mrg,mr->mf", inverse, slopes, residual, optimize=True), inverse
 
 
@@ -284,17 +270,16 @@ def locate(
         if kept.sum() <= len(seeking.axes):
             continue
         sought[frames] = True
-        sight = Sight.of(seeking, array.noise + scatter, kept)
+        read = fields.sensors[kept]
+        whitener = _whitener(array.noise + scatter, fields.sensors, read)
+        some = replace(seeking, whitener=whitener)
         for part in slices(frames.size, _BATCH):
-            some = frames[part]
-            whitened = values[np.ix_(some, kept)] @ sight.whitener.T
-            starts = sight.starts(whitened, grid, on_grid)
-            seen = np.isfinite(starts[:, 0, 0])
-            if seen.any():
-                best = sight.fitted(whitened[seen], starts[seen])
-                of = some[seen]
-                state[of], covariance[of], p_value[of] = sight.judged(whitened[seen], best)
-    places, force, ratios = _parts(state)
+            u = np.nan_to_num(values[frames[part]]) @ whitener.T
+            seen, starts = some.starts(u, grid, on_grid)
+            of = frames[part][seen]
+            best = some.fitted(u[seen], starts)
+            state[of], covariance[of], p_value[of] = some.judged(u[seen], best)
+    places, force, ratios = seeking.contact(state)
     blank = ~np.isfinite(readings).any(axis=1)
     said = {
         "no reading": blank,
@@ -305,10 +290,7 @@ def locate(
         "weak": np.sqrt(covariance[:, 2, 2]) > _WEAK * force,
         "misfit": p_value < FALSE_ALARM,
     }
-    flags = [""] * len(values)
-    for name, frames in said.items():
-        for i in np.flatnonzero(frames):
-            flags[i] = f"{flags[i]}; {name}".removeprefix("; ")
+    rows = np.transpose([*said.values()])
     return Contacts(
         x=places[:, 0],
         y=places[:, 1],
@@ -317,18 +299,13 @@ def locate(
         shear=force[:, None] * ratios,
         covariance=covariance,
         p_value=p_value,
-        flags=tuple(flags),
+        flags=tuple("; ".join(compress(said, row)) for row in rows),
         assumed_shear=float(seeking.shear),
         indenter=None if isinstance(indenter, str) else indenter,
         frame=np.arange(len(values)),
         centres=fields.centres,
         unit=fields.unit,
     )
-
-
-def _parts(state: FloatArray) -> ArrayTriple:
-    """Return places, forces and shears over forces of states (m, 5)."""
-    return state[:, :2], state[:, 2], state[:, 3:]
 
 
 def columns_of(array: ArrayData, readings: ArrayLike, name: str) -> FloatArray:
