@@ -242,7 +242,7 @@ def steps(residual: FloatArray, slopes: FloatArray, damping: FloatArray | float 
     """Return damped Gauss-Newton steps (m, f) of rows, and inverses of the normal equations."""
     normal = slopes.swapaxes(1, 2) @ slopes
     more = np.reshape(damping, (-1, 1, 1)) * np.eye(normal.shape[1])
-    inverse = np.linalg.inv(normal * (1 + more))
+    inverse = floats(np.linalg.inv(normal * (1 + more)))
     return np.einsum("mfg,mrg,mr->mf", inverse, slopes, residual, optimize=True), inverse
 
 

@@ -16,8 +16,6 @@ that a contact like it reads what was measured, whatever the law of the film.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 
 from memscal.axisymmetry.hankel import RadialSpectrum, Wavenumbers, radial_spline
@@ -81,12 +79,9 @@ class ReceptiveFields:
 
     def normal(self, places: FloatArray, force: FloatArray | float = 1.0) -> ArrayTriple:
         """Fields per newton without shear, and their derivatives by x and y, (m, n) each."""
-        offsets = places[:, None] - self.centres
-        table = self._looked_up(offsets, force, 2)
-        along = offsets * table[..., 1:]
-        parts = (table[..., 0], along[..., 0], along[..., 1])
-        h, by_x, by_y = (part @ self.mixing.T for part in parts)
-        return h, by_x, by_y
+        value, along, _ = self._sources(places, force, np.zeros_like(places))
+        mixed = self.mixing.T
+        return value @ mixed, along[..., 0] @ mixed, along[..., 1] @ mixed
 
     def forward(self, places: FloatArray, force: FloatArray, shear: FloatArray) -> ArrayPair:
         """Readings (m, n), and their derivatives by x, y, force and the two shears, (m, n, 5)."""
@@ -116,44 +111,37 @@ class ReceptiveFields:
             moved[:, row] += read[:, other, None] * size
         return floats(force[:, None, None] * moved)
 
-    def _sources(self, places: FloatArray, force: FloatArray, shear: FloatArray) -> ArrayTriple:
+    def _sources(
+        self, places: FloatArray, force: FloatArray | float, shear: FloatArray
+    ) -> ArrayTriple:
         """Return f of each sensor alone with shear, and its derivatives by place and by shear."""
         offsets = places[:, None] - self.centres
-        table = self._looked_up(offsets, force, 4)
+        table = self._looked_up(offsets, force)
         pull = np.einsum("mnk,mk->mn", offsets, shear)
         along = offsets * (table[..., 1] + pull * table[..., 3])[..., None]
         along += shear[:, None] * table[..., 2:3]
         return table[..., 0] + pull * table[..., 2], along, offsets * table[..., 2:3]
 
-    def _looked_up(
-        self, offsets: FloatArray, force: FloatArray | float, columns: int
-    ) -> FloatArray:
-        """Return the first profiles at offsets and forces, (m, n, columns), interpolated."""
-        _, kernels, radii, _ = self.profiles.shape
-        table = self.profiles[..., :columns].reshape(-1, columns)
+    def _looked_up(self, offsets: FloatArray, force: FloatArray | float) -> FloatArray:
+        """Return the profiles at offsets and forces, (m, n, 4), interpolated."""
+        loads, kernels, radii, columns = self.profiles.shape
+        table = self.profiles.reshape(-1, columns)
         apart = np.sqrt(np.einsum("mnk,mnk->mn", offsets, offsets)) / self.radii[1]
         apart = np.minimum(apart, radii - 1.001)
-        start = apart.astype(np.intp)
-        share = (apart - start)[..., None]
-        start += radii * (np.arange(self.sensors.size) % kernels)
-        found = np.zeros((*apart.shape, columns))
-        for level, weight in self._levels(force):
-            first = start + kernels * radii * level
-            lower = table.take(first, axis=0)
-            found += weight * (lower + share * (table.take(first + 1, axis=0) - lower))
-        return found
-
-    def _levels(self, force: FloatArray | float) -> Iterator[tuple[FloatArray, FloatArray]]:
-        """Yield the tables around forces, and the share of each."""
-        count = self.loads.size
+        near = apart.astype(np.intp)
+        share = (apart - near)[..., None]
+        near += radii * (np.arange(self.sensors.size) % kernels)
         # The stress falls by the square of the contact radius, which Hertz has as P^(2/3).
-        place = np.interp(np.power(force, 2 / 3), self.loads ** (2 / 3), np.arange(count))
-        level = np.reshape(place, (-1, 1))
-        below = np.minimum(level.astype(np.intp), max(count - 2, 0))
-        share = (level - below)[..., None]
-        yield below, 1 - share
-        if count > 1:
-            yield below + 1, share
+        place = np.interp(np.power(force, 2 / 3), self.loads ** (2 / 3), np.arange(loads))
+        place = np.reshape(place, (-1, 1))
+        found = np.zeros((*apart.shape, columns))
+        for above in range(min(loads, 2)):
+            level = np.floor(place) + above
+            first = near + kernels * radii * np.minimum(level, loads - 1).astype(np.intp)
+            lower = table.take(first, axis=0)
+            between = lower + share * (table.take(first + 1, axis=0) - lower)
+            found += (1 - np.abs(place - level))[..., None] * between
+        return found
 
 
 def receptive_fields(array: ArrayData, indenter: RoundIndenter | None = None) -> ReceptiveFields:
@@ -199,9 +187,8 @@ def receptive_fields(array: ArrayData, indenter: RoundIndenter | None = None) ->
     changes = np.vstack([modes, *(kernels.mean(axis=0) * change for change in inputs.values())])
     changes = changes * pressures[len(pressures) // 2]
     first = array.root.shape[1]
-    by_input = np.zeros((len(inputs), array.columns.shape[1]))
-    for row, name in zip(by_input, inputs, strict=True):
-        row[first + names.index(name)] = 1.0
+    column = [first + names.index(name) for name in inputs]
+    by_input = np.eye(array.columns.shape[1])[column]
     return ReceptiveFields(
         array=array,
         sensors=sensors,
