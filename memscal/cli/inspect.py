@@ -49,8 +49,8 @@ def _tables(contents: Item) -> Iterator[Table]:
     rows += [(name, contents[name]) for name in named]
     yield Table(contents["file"], ("", ""), rows)
 
-    layout = contents.get("layout", ())
-    places = [(item["name"], *map(_number, item["place"])) for item in layout]
+    layout = contents.get("layout", {})
+    places = [(name, *map(_number, place)) for name, place in layout.items()]
     yield Table(f"Layout of {len(places)} sensors", ("sensor", "x (mm)", "y (mm)"), places)
     quantities = [(_words(item), _value(item), item["path"]) for item in contents["quantities"]]
     title = "Quantities (± standard uncertainty, k = 1)"

@@ -311,7 +311,11 @@ def write_files(contents: Mapping[Path, bytes], *, force: bool) -> None:
 
 
 def deliver(
-    result: Any, output: Path | None, save: Callable[..., None], options: Mapping[str, Any]
+    result: Any,
+    output: Path | None,
+    save: Callable[..., None],
+    options: Mapping[str, Any],
+    key: str = "output",
 ) -> None:
     """Write a result, its figures and its page, all of them or none; print it, and what it says."""
     force = options["force"]
@@ -320,7 +324,7 @@ def deliver(
         if output is not None:
             save(output, overwrite=force)
         write_files(files, force=force)
-        head = {"output": output and str(output)}
+        head = {key: output and str(output)}
         emit_result(result, head, as_json=options["as_json"], brief=options["brief"])
     show_messages(result.messages)
     say_written([output, *files])

@@ -129,7 +129,7 @@ HOOKS = {
 """Function by which a room calls what stands above it, or an extension: its module."""
 
 FILES = {"memscal-array": "extensions.arrays.files"}
-"""Schema of an extension's files: the module with ``KIND``, their reader and their layout."""
+"""Schema of an extension's files: the module with their reader, ``read_open``, and ``LAYOUT``."""
 
 PUBLIC = {
     "extensions.arrays.calibrate_array": ["ArrayCalibration", "calibrate_array"],

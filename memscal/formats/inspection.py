@@ -1,6 +1,6 @@
 """Contents of a file, and its checks step by step: for ``memscal inspect`` and ``check``."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -21,10 +21,32 @@ from memscal.model import records
 from memscal.model.arrays import Values, value_record
 from memscal.model.quantities import Record, estimated_quantity, record
 
-Kind = tuple[Callable[[SafeFile], Any], Mapping[str, Record]]
-"""Reader of a kind of file, and its records by their paths, in the order of their listing."""
-
-_MEASURED_ON = {
+_READERS: dict[str, Callable[[SafeFile], Any]] = {
+    writer.SCAN_SCHEMA: scan_from,
+    writer.REFERENCE_SCHEMA: profile_from,
+    writer.ARTIFACT_SCHEMA: artifact_from,
+    writer.STRESS_SCHEMA: stress_from,
+}
+# What files may hold, by its path, in the order of the listing; no file holds all of it.
+_LAYOUT = {
+    "/entry": records.EXPERIMENT,
+    "/entry/data": record(
+        "NXdata", *records.SCAN_DATA.quantities, *records.TAKEN_FOR_GRANTED.quantities
+    ),
+    "/entry/noise_record": records.SCAN_DATA,
+    "/entry/apparatus_function": records.FIELD,
+    "/entry/radial_profile": records.RADIAL_VERSION_1_0,
+    "/entry/radial_covariance": records.RADIAL_COVARIANCE,
+    "/entry/kernel_changes": records.KERNEL_CHANGES,
+    "/entry/shared_effects": records.SHARED_EFFECTS,
+    "/entry/radial_profile_bayesian": records.RADIAL,
+    "/entry/radial_profile_division": records.RADIAL,
+    "/entry/transfer_function": records.TRANSFER,
+    "/entry/reconvolution": records.RECONVOLUTION,
+    "/entry/reference": records.REFERENCE_DATA,
+    "/entry/parameters": records.CONTACT,
+    "/entry/parameters/indenter": records.INDENTER,
+    "/entry/parameters/film": records.FILM,
     "/entry/indenter": records.INDENTER,
     "/entry/sample/film": records.FILM,
     "/entry/sample": records.SAMPLE,
@@ -32,59 +54,11 @@ _MEASURED_ON = {
     "/entry/instrument/load_cell": records.LOAD_CELL,
     "/entry/instrument/stage": records.STAGE,
     "/entry/user": records.USER,
-}
-_KINDS: dict[str, Kind] = {
-    writer.SCAN_SCHEMA: (
-        scan_from,
-        {
-            "/entry": records.EXPERIMENT,
-            "/entry/data": record(
-                "NXdata", *records.SCAN_DATA.quantities, *records.TAKEN_FOR_GRANTED.quantities
-            ),
-            "/entry/noise_record": records.SCAN_DATA,
-            "/entry/reference": records.REFERENCE_DATA,
-            **_MEASURED_ON,
-            "/entry/synthetic": records.SYNTHETIC,
-        },
-    ),
-    writer.REFERENCE_SCHEMA: (
-        profile_from,
-        {
-            "/entry/reference": records.REFERENCE_DATA,
-            "/entry/parameters": records.CONTACT,
-            "/entry/parameters/indenter": records.INDENTER,
-            "/entry/parameters/film": records.FILM,
-            "/entry/process/numerics": records.NUMERICS,
-            "/entry/process": record(
-                "NXprocess", *records.PROFILE_NOTES.quantities, *records.SOLVER.quantities
-            ),
-        },
-    ),
-    writer.ARTIFACT_SCHEMA: (
-        artifact_from,
-        {
-            "/entry": records.TIMES,
-            "/entry/apparatus_function": records.FIELD,
-            "/entry/radial_profile": records.RADIAL_VERSION_1_0,
-            "/entry/radial_covariance": records.RADIAL_COVARIANCE,
-            "/entry/kernel_changes": records.KERNEL_CHANGES,
-            "/entry/shared_effects": records.SHARED_EFFECTS,
-            "/entry/radial_profile_bayesian": records.RADIAL,
-            "/entry/radial_profile_division": records.RADIAL,
-            "/entry/transfer_function": records.TRANSFER,
-            "/entry/reconvolution": records.RECONVOLUTION,
-            "/entry/reference": records.REFERENCE_DATA,
-            **_MEASURED_ON,
-            "/entry/process": records.PROCESS,
-        },
-    ),
-    writer.STRESS_SCHEMA: (
-        stress_from,
-        {
-            **_MEASURED_ON,
-            "/entry/sensor": records.CONVERSION,
-            "/entry/process": records.PROCESS,
-        },
+    "/entry/synthetic": records.SYNTHETIC,
+    "/entry/sensor": records.CONVERSION,
+    "/entry/process/numerics": records.NUMERICS,
+    "/entry/process": record(
+        "NXprocess", *records.PROFILE_NOTES.quantities, *records.PROCESS.quantities
     ),
 }
 
@@ -103,7 +77,7 @@ def describe(path: FilePath, *, accept_altered: bool = False) -> Values:
     with open_hdf5(path, accept_altered=accept_altered) as file:
         schema = _schema(file)
         version = require_schema(file, schema)
-        held = _kind(schema)[0](file)
+        held = _reader(schema)(file)
         quantities = []
         arrays = []
         provenance = []
@@ -128,15 +102,19 @@ def describe(path: FilePath, *, accept_altered: bool = False) -> Values:
             }
             for check in read_quality(file)
         ]
-        altered = file.source.altered
+        stated: Values = {}
+        if file.source.altered:
+            stated["altered"] = file.source.altered
+        # Places of the sensors of an array by design, in mm.
+        if getattr(held, "layout", None) is not None:
+            stated["layout"] = dict(zip(held.sensors, (1e3 * held.layout).tolist(), strict=True))
         return {
             "file": file.name,
             "sha256": file.source.sha256,
-            **({"altered": altered} if altered else {}),
+            **stated,
             "schema": schema,
             "schema_version": version,
             "title": file.optional_text("/entry/title"),
-            **_layout_of(held),
             "quantities": quantities,
             "arrays": arrays,
             "checks": checks,
@@ -160,7 +138,7 @@ def check(path: FilePath) -> list[Finding]:
             if not findings[-1].passed:
                 return findings
             step = "content"
-            _kind(schema)[0](file)
+            _reader(schema)(file)
             findings.append(Finding(step, True, "Complete, with units of the right dimension."))
     except MemscalError as error:
         findings.append(Finding(step, False, str(error)))
@@ -179,7 +157,7 @@ def _digest(file: SafeFile) -> Finding:
 
 def _schema(file: SafeFile) -> str:
     schema = file.attribute("/", writer.SCHEMA_ATTRIBUTE)
-    known = [*_KINDS, *FILES]
+    known = [*_READERS, *FILES]
     if schema in known:
         return str(schema)
     raise FormatError(
@@ -190,14 +168,15 @@ def _schema(file: SafeFile) -> str:
     )
 
 
-def _kind(schema: str) -> Kind:
-    return _KINDS.get(schema) or module(FILES[schema]).KIND
+def _reader(schema: str) -> Callable[[SafeFile], Any]:
+    return _READERS.get(schema) or module(FILES[schema]).read_open
 
 
 def _layout(file: SafeFile, schema: str) -> Iterator[tuple[str, Record]]:
     names = file.text_list("/entry/parameters/names")
     yield "/entry/parameters", record("NXcollection", *map(estimated_quantity, names))
-    yield from _kind(schema)[1].items()
+    own = module(FILES[schema]).LAYOUT if schema in FILES else {}
+    yield from {**own, **_LAYOUT, **own}.items()
     for path in profile_paths(file):
         yield path, records.STRESS_NUMBERS
         yield path, records.STRESS_PROFILE
@@ -218,15 +197,6 @@ def _quantity_row(file: SafeFile, path: str) -> Values:
         "standard_uncertainty": _uncertainty(file, path),
         "unit": unit,
     }
-
-
-def _layout_of(held: Any) -> Values:
-    """Return the places of the sensors of an array by design, in mm, where they are stated."""
-    layout = getattr(held, "layout", None)
-    if layout is None:
-        return {}
-    pairs = zip(held.sensors, (1e3 * layout).tolist(), strict=True)
-    return {"layout": [{"name": name, "place": place, "unit": "mm"} for name, place in pairs]}
 
 
 def _uncertainty(file: SafeFile, path: str) -> float | int | None:

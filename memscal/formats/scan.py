@@ -249,8 +249,7 @@ def _data_group(scan: Scan) -> Group:
         stated[name] = stated[name] or None
     for name, ending in _LAYOUTS:
         if stated[name] is not None:
-            x, y = stated[name].T
-            stated |= {f"layout_x{ending}": x, f"layout_y{ending}": y}
+            stated[f"layout_x{ending}"], stated[f"layout_y{ending}"] = stated[name].T
     data |= write_record(records.TAKEN_FOR_GRANTED.read_in(scan.reading), stated).children
     data |= _nodes(scan, (), reading_high=scan.reading_high)
     data |= _nodes(scan, axes, u_zz=scan.u_zz)

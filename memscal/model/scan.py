@@ -385,7 +385,7 @@ class Scan:
     source: SourceFile | None = None
 
     def __post_init__(self) -> None:
-        if any(getattr(self, name) is not None for name in OF_SENSORS) or len(self.sensors):
+        if len(self.sensors) or self.layout is not None:
             self._freeze_array()
             return
         self._freeze_positions()
@@ -530,8 +530,7 @@ class Scan:
         names = tuple(map(str, self.sensors))
         number = len(names)
         u_zz = frozen_array(self.u_zz)
-        alike = len({*names, ""}) <= number
-        if alike or u_zz.shape[:1] != (number,) or self.channels:
+        if len({*names, ""}) <= number or u_zz.shape[:1] != (number,) or self.channels:
             raise InputError(
                 f"The sensors of the scan are {self.sensors!r}, u_zz has shape {u_zz.shape}, and "
                 f"further channels are: {', '.join(self.channels) or 'none'}.",
@@ -541,13 +540,13 @@ class Scan:
                 "range.",
             )
         own: Values = {"sensors": names, "sensor": self.sensor, "u_zz": u_zz}
-        shapes = {"u_zz_errors": u_zz.shape, **dict.fromkeys(OF_SENSORS, (number,))}
-        shapes |= dict.fromkeys(("layout", "layout_uncertainty"), (number, 2))
+        shapes: Values = {"u_zz_errors": u_zz.shape, **dict.fromkeys(OF_SENSORS, (number,))}
+        shapes |= {"layout": (number, 2), "layout_uncertainty": (number, 2)}
         for name, shape in shapes.items():
-            own[name] = stated = getattr(self, name)
-            if stated is None:
+            own[name] = getattr(self, name)
+            if own[name] is None:
                 continue
-            values = frozen_array(stated, dtype=bool if name == "used" else float)
+            values = frozen_array(own[name], dtype=bool if name == "used" else float)
             whole = values.shape == shape and np.isfinite(values).all()
             if values.shape != shape[: values.ndim] or (name == "layout" and not whole):
                 raise InputError(

@@ -28,7 +28,7 @@ def test_the_scan_of_an_array_comes_back_and_holds_that_of_each_sensor(kind):
     assert (third.sensor.name, third.sensors) == ("µ 2", ())
     np.testing.assert_allclose(third.u_zz, 3 * one.u_zz)
     np.testing.assert_array_equal(third.normal_load, one.normal_load)
-    assert describe("scan.h5")["layout"][2] == {"name": "µ 2", "place": [2, 0.1], "unit": "mm"}
+    assert describe("scan.h5")["layout"]["µ 2"] == [2, 0.1]
     with h5py.File("scan.h5") as file:
         data = file["/entry/data"]
         assert [*data.attrs["axes"]] == ["sensor", *AXES[kind].split()]

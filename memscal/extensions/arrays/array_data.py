@@ -13,7 +13,7 @@ convention.  A uniform pressure p reads :math:`p \sum_j C_{ij} A_j`.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import field
 from functools import cached_property
 
@@ -28,9 +28,8 @@ from memscal.model.arrays import (
     Values,
     array_record,
     keyword_array_record,
-    same_content,
 )
-from memscal.model.checks import Checked, QualityCheck
+from memscal.model.checks import Checked, Message, QualityCheck
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Rod
 from memscal.model.instrument import Equipment, LoadCell, User
@@ -113,7 +112,7 @@ class ArrayData(Checked):
     reading_high: FloatArray | None = None
     reading: Reading = VOLTS
     checks: tuple[QualityCheck, ...] = ()
-    failing: Mapping[str, tuple[str, ...]] = field(default_factory=dict)  # sensors, by check
+    failing: Mapping[str, Sequence[str]] = field(default_factory=dict)  # sensors, by check
     process: Process
     load_cell: LoadCell = field(default_factory=LoadCell)
     stage: Equipment = field(default_factory=Equipment)
@@ -125,12 +124,10 @@ class ArrayData(Checked):
         """Return its fields by their names, without what follows from them."""
         return {name: getattr(self, name) for name in ArrayData.__dataclass_fields__}
 
-    def __eq__(self, other: object) -> bool:
-        """Whether another array has the same content."""
-        return isinstance(other, ArrayData) and same_content(self.stated(), other.stated())
-
-    # Arrays have no hash; object's own is declared as a method.
-    __hash__ = None  # type: ignore[assignment]
+    @property
+    def messages(self) -> tuple[Message, ...]:
+        """What the calibration says beside its checks."""
+        return self.process.messages
 
     @property
     def pairs(self) -> IndexArray:
@@ -185,6 +182,11 @@ class ArrayData(Checked):
     def radial(self, transforms: FloatArray, r: FloatArray) -> FloatArray:
         """Return what has the transforms (nodes,) or (nodes, m) at radii in m."""
         return hankel_transform(self.k, transforms, r) / (2 * np.pi) ** 2
+
+    def distances(self, i: int) -> tuple[FloatArray, FloatArray]:
+        """Return where the presses are from a sensor, (2, t), and how far: on a line, signed."""
+        away = np.stack([self.readings.x, self.readings.y]) - self.places[i][:, None]
+        return away, away[0] if self.on_a_line else np.hypot(*away)
 
     def kernel_of(self, i: int) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return a sensor's transform of G, its changes by modes, and the modes' root."""

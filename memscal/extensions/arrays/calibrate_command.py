@@ -8,7 +8,6 @@ from click.core import ParameterSource
 from memscal.cli import output as out
 from memscal.cli.failures import exit_code_of
 from memscal.cli.options import LAW
-from memscal.formats.files import together
 
 #: Options that the calibration of an array takes, and those of what is written.
 _TAKEN = ("kernel", "crosstalk", "reference", *LAW, "rod_friction", "override", "accept_altered")
@@ -30,22 +29,14 @@ def calibrate_array_file(context: click.Context) -> int:
         raise click.UsageError(problem)
     if len(asked["scans"]) > 1:
         raise click.UsageError("An array is calibrated from one scan.")
-    force = asked["force"]
     output = asked["output"] or out.default_name(scan, ".array.h5")
     outputs = [output, asked["report"], *asked["figures"]]
-    out.prove_writable(outputs, force=force, inputs=[scan, asked["reference"]])
+    out.prove_writable(outputs, force=asked["force"], inputs=[scan, asked["reference"]])
 
     from memscal.extensions.arrays.calibrate_array import calibrate_array
 
     with out.working("Calibrating the array"):
         options = {name: asked[name] for name in _TAKEN if asked[name] is not None}
-        calibration = calibrate_array(scan, **options)
-    files = out.drawn(calibration, asked["figures"], asked["report"])
-    with together():
-        calibration.array.save(output, overwrite=force)
-        out.write_files(files, force=force)
-        out.emit_result(calibration, {"artifact": str(output)}, as_json=asked["as_json"])
-    out.show_messages(calibration.array.process.messages)
-    out.say_written(outputs)
-    then = f" {output.name} was written and is marked so."
-    return exit_code_of(calibration.checks, then=then)
+        array = calibrate_array(scan, **options).array
+    out.deliver(array, output, array.save, asked, "artifact")
+    return exit_code_of(array.checks, then=f" {output.name} was written and is marked so.")

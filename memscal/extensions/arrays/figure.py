@@ -76,9 +76,8 @@ def _draw_places(axes: Axes, array: SensorArray) -> None:
         end = array.places + _LONGER * (away - np.nanmean(away, axis=0))
         axes.plot([x, end[:, 0] / MM], [y, end[:, 1] / MM], color=GAUSSIAN)
         axes.plot(*array.layout[~array.used].T / MM, "x", color=FAILED)
-    power = 10.0 ** np.floor(np.log10(np.nanmedian(a)))
     for i in np.flatnonzero(array.used) if a.size <= _MOST_NUMBERS else ():
-        number = f"{a[i] / power:.2f}"
+        number = f"{a[i]:.3g}"
         axes.annotate(number, (x[i], y[i]), (-8, 5), textcoords="offset points", fontsize=6)
     axes.set_aspect("equal", adjustable="datalim")
     axes.set(xlabel="x (mm)", ylabel="y (mm)")
@@ -92,9 +91,6 @@ def _draw_crosstalk(axes: Axes, array: SensorArray) -> None:
     largest = 200 * np.max(abs(array.crosstalk), where=known, initial=IDENTIFIED)
     u = f"u up to {percent(errors[known].max())}" if known.any() else "not identified"
     _draw_matrix(axes, array, crosstalk, f"crosstalk (%), {u}", largest)
-    for i, j in np.argwhere(known) if len(known) <= _MOST_NUMBERS else ():
-        text = f"{crosstalk[i, j]:.2f}\n±{100 * errors[i, j]:.2f}"
-        axes.annotate(text, (j, i), ha="center", va="center", fontsize=5)
 
 
 def _draw_matrix(
@@ -104,29 +100,29 @@ def _draw_matrix(
     axes.set_facecolor("#D0D0D0")
     image = axes.imshow(values, cmap="RdBu_r", vmin=-limit, vmax=limit, interpolation="nearest")
     axes.figure.colorbar(image, ax=axes, label=label)
-    if len(values) <= _MOST_NUMBERS:
-        axes.set_yticks(range(len(values)), map(drawable, array.sensors))
+    _name_rows(axes, array)
+
+
+def _name_rows(axes: Axes, array: SensorArray) -> None:
+    if len(array.sensors) <= _MOST_NUMBERS:
+        axes.set_yticks(range(len(array.sensors)), map(drawable, array.sensors))
 
 
 def _draw_readings(axes: Axes, array: SensorArray) -> None:
-    """Draw what each sensor reads near the rod, measured and predicted, in a cell of its own."""
+    """Draw what each sensor reads near the rod, measured and predicted, in a row of its own."""
     readings = array.readings
-    reach = _NEAR * array.film.thickness
-    columns = int(np.ceil(np.sqrt(array.used.size)))
-    for i in np.flatnonzero(array.used):
-        row, column = divmod(i, columns)
-        x, y = readings.x - array.places[i, 0], readings.y - array.places[i, 1]
-        distance = x if array.on_a_line else np.hypot(x, y)
+    for i in np.flatnonzero(array.used).tolist():
+        _, distance = array.distances(i)
         near = np.argsort(distance)
-        near = near[abs(distance[near]) < reach]
-        place = column + distance[near] / reach * (0.4 if array.on_a_line else 0.8)
+        near = near[abs(distance[near]) < _NEAR * array.film.thickness]
         both = np.stack([readings.u[i], readings.predicted[i]]) - readings.background[i]
-        measured, predicted = 0.8 * both[:, near] / both[1].max() - row
-        axes.plot(place, measured, ".", ms=1.5, color=MEASURED, rasterized=True)
-        axes.plot(place, predicted, color=DECONVOLVED, lw=0.6)
-        if columns**2 <= _MOST_NUMBERS:
-            axes.annotate(drawable(array.sensors[i]), (place[0], 0.7 - row), fontsize=6)
-    axes.set_axis_off()
+        # Upwards, as the rows of the other panels go downwards.
+        measured, predicted = i - 0.8 * both[:, near] / both[1].max()
+        axes.plot(distance[near] / MM, measured, ".", ms=1.5, color=MEASURED, rasterized=True)
+        axes.plot(distance[near] / MM, predicted, color=DECONVOLVED, lw=0.6)
+    _name_rows(axes, array)
+    axes.invert_yaxis()
+    axes.set_xlabel("distance (mm)")
 
 
 def report(result: Any) -> Report:
@@ -137,7 +133,7 @@ def report(result: Any) -> Report:
         title=f"Array of {len(array.sensors)} sensors",
         pictures=[Picture(result.plot, _CAPTION, _CAPTION)],
         checks=array.checks,
-        messages=process.messages,
+        messages=array.messages,
         files={"scan": process.input_scan},
         process=process,
     )

@@ -18,10 +18,10 @@ from memscal.formats.digest import require_schema, require_unaltered
 from memscal.formats.files import FilePath
 from memscal.formats.groups import read_record, write_record
 from memscal.formats.hdf5.reader import SafeFile
-from memscal.formats.hdf5.writer import ARRAY_SCHEMA, Group, Nodes, file_tree, to_json, write_tree
+from memscal.formats.hdf5.writer import ARRAY_SCHEMA, Group, Nodes, file_tree, write_tree
 from memscal.formats.units import reading_of
 from memscal.model import records
-from memscal.model.arrays import Values
+from memscal.model.arrays import TINY, Values
 from memscal.model.instrument import StressSensor
 from memscal.model.quantities import Quantity, Record, record
 
@@ -36,6 +36,8 @@ def _declared(nx_class: str, signal: str, quantities: list[Values]) -> Record:
 _TABLES = tomllib.loads(Path(__file__).with_name("files.toml").read_text(encoding="utf-8"))
 RECORDS = {name: _declared(**table) for name, table in _TABLES.items()}
 """Records of the groups of the file, by their names."""
+LAYOUT = {f"/entry/{name}": of for name, of in RECORDS.items()}
+"""The same by their paths, for ``memscal check`` and ``memscal inspect``."""
 
 _PARTS = ("of_ln_a", "of_x", "of_y", "of_c", "of_mode")
 
@@ -61,21 +63,19 @@ def write_array(data: ArrayData, path: FilePath, *, overwrite: bool = False) -> 
 def stated_in_file(data: ArrayData) -> Values:
     """Return what the groups hold, by the names of their records."""
     deviation = np.sqrt(np.diag(data.noise))
-    scale = np.outer(deviation, deviation)
     radii = RADII * np.fmax.reduce(data.gaussian_sigmas, initial=0.0)
     stated = {
         **data.stated(),
         **vars(data.modes),
         **vars(data.readings),
         **dict(zip(_PARTS, data.split(data.columns), strict=True)),
-        "names": to_json(data.sensors),
-        "inputs": to_json(list(data.effects)),
+        "inputs": list(data.effects),
         "reference_unit": data.reading.per,
         "conversion_constants_errors": np.sqrt(np.diag(data.covariance)),
         "gaussian_sigmas_errors": np.linalg.norm(data.sigma_columns, axis=1),
         "crosstalk_errors": data.crosstalk_uncertainties,
         "deviation": deviation,
-        "correlation": np.divide(data.noise, scale, out=np.zeros_like(scale), where=scale != 0),
+        "correlation": data.noise / np.maximum(np.outer(deviation, deviation), TINY),
         "r": radii,
         "g": data.radial(np.nan_to_num(data.kernels).T, radii).T,
     }
@@ -86,7 +86,7 @@ def stated_in_file(data: ArrayData) -> Values:
     return stated
 
 
-def array_from(file: SafeFile) -> ArrayData:
+def read_open(file: SafeFile) -> ArrayData:
     """Read the array of an open memscal-array file; refuse one that was changed."""
     require_schema(file, ARRAY_SCHEMA)
     require_unaltered(file)
@@ -94,14 +94,12 @@ def array_from(file: SafeFile) -> ArrayData:
     names = tuple(file.text_list("/entry/sensors/names"))
     sizes = {"sensor": len(names)}
     read: Values = {}
-    for group, of in RECORDS.items():
-        read |= read_record(of.read_in(reading), file, f"/entry/{group}", sizes=sizes)
-    effects = file.text_list("/entry/roots/names")
+    for path, of in LAYOUT.items():
+        read |= read_record(of.read_in(reading), file, path, sizes=sizes)
     columns = np.vstack([read[part] for part in _PARTS])
-    root, *changes = np.split(columns, range(-len(effects), 0), axis=1)
+    opened = columns.shape[1] - len(read["inputs"])
     if "layout_x" in read:
         read["layout"] = np.column_stack([read["layout_x"], read["layout_y"]])
-    scale = np.outer(read["deviation"], read["deviation"])
     film, indenter = groups.read_stated(file)
     read |= {
         **groups.read_circumstances(file),
@@ -109,17 +107,16 @@ def array_from(file: SafeFile) -> ArrayData:
         "used": read["used"] > 0,
         "centres": np.column_stack([read["centre_x"], read["centre_y"]]),
         "estimated": read["estimated"] > 0,
-        "noise": read["correlation"] * scale,
-        "modes": KernelModes(read["changes"], read["owner"].astype(np.intp)),
-        "root": root,
-        "effects": {name: of[:, 0] for name, of in zip(effects, changes, strict=True)},
+        "noise": read["correlation"] * np.outer(read["deviation"], read["deviation"]),
+        "modes": KernelModes(read["changes"], read["owner"]),
+        "root": columns[:, :opened],
+        "effects": dict(zip(read["inputs"], columns.T[opened:], strict=True)),
         "film": film,
         "indenter": indenter,
         "readings": ArrayReadings(**{n: read[n] for n in ArrayReadings.__dataclass_fields__}),
         "load": file.require_scalar("/entry/indenter/load", "force"),
         "reading": replace(reading, per=read["reference_unit"]),
         "checks": groups.read_quality(file),
-        "failing": {check: tuple(of) for check, of in read["failing"].items()},
         "process": groups.read_process(file),
     }
     data = ArrayData(**{n: read[n] for n in read.keys() & ArrayData.__dataclass_fields__.keys()})
@@ -129,19 +126,3 @@ def array_from(file: SafeFile) -> ArrayData:
             cure="Calibrate the array again.",
         )
     return data
-
-
-KIND = (
-    array_from,
-    {
-        **{f"/entry/{name}": of for name, of in RECORDS.items()},
-        "/entry/indenter": records.INDENTER,
-        "/entry/sample/film": records.FILM,
-        "/entry/instrument/load_cell": records.LOAD_CELL,
-        "/entry/instrument/stage": records.STAGE,
-        "/entry/user": records.USER,
-        "/entry": records.TIMES,
-        "/entry/process": records.PROCESS,
-    },
-)
-"""Reader and layout of the file, for ``memscal check`` and ``memscal inspect``."""

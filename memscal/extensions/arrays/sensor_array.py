@@ -310,8 +310,6 @@ def load_array(path: str | PathLike[str], *, accept_altered: bool = False) -> Se
                 cure="Calibrate a scan of all sensors (memscal calibrate), or use the functions "
                 "for one sensor, such as memscal.load_apparatus.",
             )
-        data = files.array_from(file)
-        source = file.source
-    array = SensorArray(**data.stated())
-    object.__setattr__(array, "source", source)
+        array = SensorArray(**files.read_open(file).stated())
+        vars(array)["source"] = file.source
     return array

@@ -20,7 +20,7 @@ from memscal.model.stress import StressProfile
 
 _ESTIMATED = np.array(["conversion_constant", "gaussian_sigma", "centre", "centre_y", "baseline"])
 #: What is that of the array.
-_SAME = [
+_SAME = (
     "film",
     "indenter",
     "load",
@@ -30,12 +30,12 @@ _SAME = [
     "user",
     "start_time",
     "end_time",
-]
+)
 
 
 def single_sensor(array: ArrayData, name: str) -> ApparatusFunction:
     """Return a sensor of an array, with what is known of it by all sources."""
-    used = [one for one, works in zip(array.sensors, array.used, strict=True) if works]
+    used = np.array(array.sensors)[array.used].tolist()
     require_names("The array does not use a sensor", [name], used)
     reference = array.reference
     if reference is None:
@@ -64,11 +64,11 @@ def single_sensor(array: ArrayData, name: str) -> ApparatusFunction:
     at_k = np.array([np.interp(k, array.k, column) for column in (kernel, *of_kernel.T)])
     logarithms = np.vstack([of_a, rows[1] / sigma, of_a + (at_k[1:] / at_k[0]).T])
     radii = 8 * array.film.thickness * np.linspace(0.0, 1.0, 321)
-    failing = array.failing
+    # Without what other sensors alone fail.
     checks = [
         check
         for check in array.checks
-        if check.passed or not failing.get(check.name) or name in failing[check.name]
+        if check.passed or name in (array.failing.get(check.name) or used)
     ]
     return ApparatusFunction(
         plane=None,
@@ -119,11 +119,11 @@ def _transfer(
     """Return the transform of G, resolved up to where the Gaussian's is three uncertainties."""
     errors = np.linalg.norm(of_kernel, axis=1)
     lost = RESOLVED * errors > gaussian
+    lost[-1] = True
     readings = array.readings
     x = np.unique(readings.x if np.ptp(readings.x) else readings.y)
-    sampled = np.pi * (x.size - 1) / np.ptp(x)
-    resolved = float(min(array.k[np.argmax(lost) if lost.any() else -1], sampled))
-    return TransferFunction(array.k, abs(kernel), errors, np.ones_like(errors), resolved)
+    resolved = min(array.k[lost.argmax()], np.pi / np.diff(x).mean())
+    return TransferFunction(array.k, abs(kernel), errors, np.ones_like(errors), float(resolved))
 
 
 def _by_source(array: ArrayData, columns: FloatArray) -> Arrays:
@@ -136,12 +136,9 @@ def _by_source(array: ArrayData, columns: FloatArray) -> Arrays:
 def _reconvolution(array: ArrayData, i: int, spectra: FloatArray) -> Reconvolution:
     """Return the readings of a sensor less what it reads of the others' signals."""
     readings = array.readings
-    away = np.stack([readings.x, readings.y]) - array.places[i][:, None]
-    distance = np.hypot(*away)
-    signals = array.conversion_constants[i] * readings.load * array.radial(spectra.T, distance).T
-    # The Gaussian has an A of its own.
-    signals[1] *= (signals[0] @ signals[1]) / (signals[1] @ signals[1])
-    own, gaussian = signals + readings.background[i]
+    away, distance = array.distances(i)
+    scale = array.conversion_constants[i] * readings.load
+    own, gaussian = scale * array.radial(spectra.T, abs(distance)).T + readings.background[i]
     residual = readings.u[i] - readings.predicted[i]
     columns = {
         "x": readings.x if array.on_a_line else distance,

@@ -26,8 +26,7 @@ def array_of(result: Any) -> SensorArray:
 
 def identified(array: SensorArray) -> bool:
     """Whether the crosstalk is known well enough to be shown."""
-    failed = [check.name for check in array.checks if not check.passed]
-    return "crosstalk_identified" not in failed
+    return all(check.passed for check in array.checks if check.name == "crosstalk_identified")
 
 
 def _numbers(array: SensorArray) -> Values:
@@ -114,14 +113,12 @@ def tables(result: Any) -> list[Table]:
 def _crosstalk_table(array: SensorArray, crosstalk: Values) -> Table:
     """Return what each sensor reads of those whose share was estimated, if that is identified."""
     percents = 100 * np.array([crosstalk["value"], crosstalk["standard_uncertainty"]])
-    rows = []
-    most = array.estimated.sum(axis=1).max()
-    for i, name in enumerate(array.sensors if identified(array) else ()):
-        others = np.flatnonzero(array.estimated[i])
-        cells = [f"{array.sensors[j]}: {format_measured(*percents[:, i, j])}" for j in others]
-        if cells:
-            rows.append((name, *cells, *[""] * (most - len(cells))))
-    return Table("Crosstalk", ("sensor", "reads of (%)", *[""] * (most - 1)), rows)
+    shares: dict[str, list[str]] = {}
+    for i, j in array.pairs if identified(array) else ():
+        share = f"{array.sensors[j]}: {format_measured(*percents[:, i, j])}"
+        shares.setdefault(array.sensors[i], []).append(share)
+    rows = [(name, ", ".join(parts)) for name, parts in shares.items()]
+    return Table("Crosstalk", ("sensor", "reads of (%)"), rows)
 
 
 def mapping(result: Any) -> Values:
@@ -138,7 +135,7 @@ def mapping(result: Any) -> Values:
         **_numbers(array),
         "estimated": array.estimated.tolist(),
         "checks": checks,
-        "warnings": texts_of(array.process.messages),
+        "warnings": texts_of(array.messages),
     }
 
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from helpers.arrays import SIGMA, A, full_array
 from helpers.digests import rewrite_digest
+from helpers.records import assert_same
 
 import memscal
 from memscal.axisymmetry.kernels import unit_gaussian
@@ -23,26 +24,11 @@ def test_what_is_stored_comes_back(tmp_path, own):
         array = replace(array, kernel="own", kernels=kernels)
     array.save(tmp_path / "array.h5")
     found = memscal.load_array(tmp_path / "array.h5")
-    for name in ("centres", "crosstalk", "covariance", "noise", "root", "k", "kernels", "layout"):
-        expected = getattr(array, name)
-        np.testing.assert_allclose(getattr(found, name), expected, rtol=1e-14, err_msg=name)
-    for name in (
-        "sensors",
-        "failing",
-        "checks",
-        "kernel",
-        "process",
-        "reading",
-        "load_cell",
-        "start_time",
-    ):
-        assert getattr(found, name) == getattr(array, name), name
-    np.testing.assert_allclose(found.readings.u, array.readings.u, rtol=1e-14)
+    assert_same(found, array, but=("source",), rtol=1e-14)
     # Units round a number once.
     found.save(tmp_path / "again.h5")
-    assert memscal.load_array(tmp_path / "again.h5") == found
+    assert_same(memscal.load_array(tmp_path / "again.h5"), found, but=("source",))
     assert found.source.file_name == "array.h5"
-    assert replace(found, load=2.0) != found
 
 
 def test_others_find_numbers_with_their_uncertainties_and_units(tmp_path):
