@@ -427,14 +427,12 @@ class Scan:
 
     def __repr__(self) -> str:
         """Return what was scanned in place of thousands of array elements."""
-        shape = " x ".join(map(str, self.shape))
+        shape = " x ".join(map(str, self.u_zz.shape))
         form = shape if self.kind == "points" else f"{self.kind}, {shape}"
         reach = f"{self.x.min() * 1e3:.4g} to {self.x.max() * 1e3:.4g} mm"
         if self.motion == "rest":
             return f"<{type(self).__name__}: noise record, {shape} readings>"
         load = "no load stated" if self.load is None else f"load {self.load:.4g} N"
-        if self.sensors:
-            load = f"{load}, {len(self.sensors)} sensors"
         return f"<{type(self).__name__}: {form} points, x from {reach}, {load}>"
 
     @property

@@ -50,7 +50,11 @@ def single_sensor(array: ArrayData, name: str) -> ApparatusFunction:
     kernel, changes, of_modes = array.kernel_of(i)
     of_kernel = changes.T @ of_modes
     gaussian = gaussian_transfer(array.k, sigma)
-    transfer = _transfer(array, kernel, of_kernel, gaussian)
+    of_modulus = np.linalg.norm(of_kernel, axis=1)
+    # Resolved is what the Gaussian has of three uncertainties or more.
+    lost = RESOLVED * of_modulus > gaussian
+    lost[-1] = True
+    resolved = float(array.k[lost.argmax()])
 
     r = RADII * sigma
     profiles = array.radial(np.column_stack([kernel, changes.T]), r)
@@ -60,7 +64,7 @@ def single_sensor(array: ArrayData, name: str) -> ApparatusFunction:
     with_a = of_g @ of_a / np.maximum(errors * np.linalg.norm(of_a), TINY)
     kernel_changes = _by_source(array, of_g + np.outer(g, of_a))
     del kernel_changes["noise"]
-    k = round_wavenumbers(transfer.resolved_wavenumber)
+    k = round_wavenumbers(resolved)
     at_k = np.array([np.interp(k, array.k, column) for column in (kernel, *of_kernel.T)])
     logarithms = np.vstack([of_a, rows[1] / sigma, of_a + (at_k[1:] / at_k[0]).T])
     radii = 8 * array.film.thickness * np.linspace(0.0, 1.0, 321)
@@ -75,7 +79,7 @@ def single_sensor(array: ArrayData, name: str) -> ApparatusFunction:
         radial_profile=ApparatusRadial(
             r, g, errors, unit_gaussian(r, sigma), of_g @ of_g.T, with_a
         ),
-        transfer=transfer,
+        transfer=TransferFunction(array.k, abs(kernel), of_modulus, np.ones_like(kernel), resolved),
         reconvolution=_reconvolution(array, i, reference * np.stack([kernel, gaussian])),
         parameters=parameters,
         checks=tuple(checks),
@@ -111,19 +115,6 @@ def _parameters(array: ArrayData, i: int) -> tuple[ParameterSet, FloatArray]:
     names = tuple(_ESTIMATED[known].tolist())
     covariance = covariance[np.ix_(known, known)]
     return ParameterSet(names, values[known], covariance, reading=array.reading), columns[:2]
-
-
-def _transfer(
-    array: ArrayData, kernel: FloatArray, of_kernel: FloatArray, gaussian: FloatArray
-) -> TransferFunction:
-    """Return the transform of G, resolved up to where the Gaussian's is three uncertainties."""
-    errors = np.linalg.norm(of_kernel, axis=1)
-    lost = RESOLVED * errors > gaussian
-    lost[-1] = True
-    readings = array.readings
-    x = np.unique(readings.x if np.ptp(readings.x) else readings.y)
-    resolved = min(array.k[lost.argmax()], np.pi / np.diff(x).mean())
-    return TransferFunction(array.k, abs(kernel), errors, np.ones_like(errors), float(resolved))
 
 
 def _by_source(array: ArrayData, columns: FloatArray) -> Arrays:

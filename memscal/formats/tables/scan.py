@@ -428,8 +428,7 @@ def _scan_of(
     if "y" not in columns and "normal_load" in columns:
         messages += _mixed_loads(columns["normal_load"], columns.get("repeat"), conditions.indenter)
     columns = _as_rows(columns)
-    normal = ("u_zz", "u_zz_errors")
-    further = [name for name in columns if name.startswith("u_") and name not in normal]
+    further = [name for name in columns if name.startswith(("u_xz", "u_yz", "u_zz of "))]
     channels: Columns = {name: columns.pop(name) for name in further}
     if load_scatter is not None:
         columns["normal_load_errors"] = load_scatter * columns["normal_load"]
