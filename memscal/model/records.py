@@ -139,6 +139,20 @@ SCAN_DATA = record(
     Quantity("reading_high", _U, "end of the range of each sensor", axes=("sensor",)),
     signal="u_zz",
 )
+SENSORS = (
+    Quantity("sensors", "names", "sensors of an array", stored="sensor_names"),
+    *along(
+        ("sensor",),
+        Quantity("layout_x", _L, "place of each sensor along x"),
+        Quantity("layout_y", _L, "place of each sensor along y"),
+        Quantity("layout_x_errors", _L, "standard uncertainty of the place along x"),
+        Quantity("layout_y_errors", _L, "standard uncertainty of the place along y"),
+        Quantity("used", _ONE, "1 of a sensor that is used, 0 of another"),
+        Quantity("reading_low", _U, "begin of the range of each sensor"),
+        Quantity("board", _ONE, "number of the board of each sensor"),
+    ),
+)
+"""What the scan of an array states of its sensors, beside its arrays."""
 TAKEN_FOR_GRANTED = record(
     "NXdata",
     Quantity("line_offset", _L, "distance of the line from the sensor"),
@@ -155,18 +169,7 @@ TAKEN_FOR_GRANTED = record(
     Quantity("dwell_time", "time", "time at each place before its reading"),
     Quantity("position_errors_by_repeat", "truth", "whether x_errors are new in each repeat"),
     Quantity("at_ceiling", _ONE, "number of readings left out at a ceiling"),
-    # Of an array of sensors.
-    Quantity("sensors", "names", "sensors of an array", stored="sensor_names"),
-    *along(
-        ("sensor",),
-        Quantity("layout_x", _L, "place of each sensor along x"),
-        Quantity("layout_y", _L, "place of each sensor along y"),
-        Quantity("layout_x_errors", _L, "standard uncertainty of the place along x"),
-        Quantity("layout_y_errors", _L, "standard uncertainty of the place along y"),
-        Quantity("used", _ONE, "1 of a sensor that is used, 0 of another"),
-        Quantity("reading_low", _U, "begin of the range of each sensor"),
-        Quantity("board", _ONE, "number of the board of each sensor"),
-    ),
+    *SENSORS,
 )
 """What a scan states of that beside its arrays, each number only where it is stated."""
 SYNTHETIC = record(

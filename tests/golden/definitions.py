@@ -45,7 +45,7 @@ DEFINITIONS: Mapping[str, tuple[str, Mapping[str, Record], tuple[str, ...]]] = {
         {
             "data": replace(
                 records.SCAN_DATA,
-                quantities=records.SCAN_DATA.quantities + records.SENSORS.quantities,
+                quantities=records.SCAN_DATA.quantities + records.SENSORS,
             ),
             **_SCANNED,
             "reference": records.REFERENCE_DATA,
