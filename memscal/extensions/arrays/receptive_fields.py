@@ -43,7 +43,7 @@ _LARGEST_KH = 20.0
 MARGIN = 2.0
 _STEPS = 200
 #: Loads over that of the calibration at which a sphere is pressed.
-_LOADS = np.geomspace(0.01, 20.0, 12)
+_LOADS = np.geomspace(0.01, 20.0, 18)
 #: A radius in place of zero, as a share of the tables' step.
 _AXIS = 1e-6
 
@@ -79,15 +79,13 @@ class ReceptiveFields:
 
     def normal(self, places: FloatArray, force: FloatArray | float = 1.0) -> ArrayTriple:
         """Fields per newton without shear, and their derivatives by x and y, (m, n) each."""
-        value, along, _ = self._sources(places, force, np.zeros_like(places))
-        mixed = self.mixing.T
-        return value @ mixed, along[..., 0] @ mixed, along[..., 1] @ mixed
+        sources = self._sources(places, force, np.zeros_like(places))
+        by_x, by_y, h = (sources[..., i] @ self.mixing.T for i in range(3))
+        return h, by_x, by_y
 
     def forward(self, places: FloatArray, force: FloatArray, shear: FloatArray) -> ArrayPair:
         """Readings (m, n), and their derivatives by x, y, force and the two shears, (m, n, 5)."""
-        value, along, towards = self._sources(places, force, shear)
-        slopes = np.concatenate([along, value[..., None], towards], axis=-1)
-        slopes = self.mixing @ slopes
+        slopes = self.mixing @ self._sources(places, force, shear)
         slopes[..., [0, 1, 3, 4]] *= force[:, None, None]
         # How the stress per newton changes with the force is left out of its derivative.
         return force[:, None] * slopes[..., 2], slopes
@@ -95,10 +93,11 @@ class ReceptiveFields:
     def errors(self, places: FloatArray, force: FloatArray, shear: FloatArray) -> FloatArray:
         """Changes of the readings by one u of each independent error of the array, (m, n, c)."""
         array = self.array
-        value, along, _ = self._sources(places, force, shear)
+        x_slope, y_slope, value, _, _ = np.moveaxis(self._sources(places, force, shear), -1, 0)
         *rows, by_pair, _ = array.split(array.columns)
         by_strength, by_x, by_y = (part[self.sensors] for part in rows)
-        own = value[..., None] * by_strength - along[..., :1] * by_x - along[..., 1:] * by_y
+        own = value[..., None] * by_strength
+        own -= x_slope[..., None] * by_x + y_slope[..., None] * by_y
         apart = np.linalg.norm(places[:, None] - self.centres, axis=-1)
         for change, owner, size in zip(self.changes, self.owner, self.sizes, strict=True):
             has = (owner == ALL) | (self.sensors == owner)
@@ -113,14 +112,16 @@ class ReceptiveFields:
 
     def _sources(
         self, places: FloatArray, force: FloatArray | float, shear: FloatArray
-    ) -> ArrayTriple:
-        """Return f of each sensor alone with shear, and its derivatives by place and by shear."""
+    ) -> FloatArray:
+        """Return what :meth:`forward` does per newton, of each sensor alone, (m, n, 5)."""
         offsets = places[:, None] - self.centres
         table = self._looked_up(offsets, force)
         pull = np.einsum("mnk,mk->mn", offsets, shear)
         along = offsets * (table[..., 1] + pull * table[..., 3])[..., None]
-        along += shear[:, None] * table[..., 2:3]
-        return table[..., 0] + pull * table[..., 2], along, offsets * table[..., 2:3]
+        towards = table[..., 2:3]
+        along += shear[:, None] * towards
+        value = table[..., :1] + pull[..., None] * towards
+        return np.concatenate([along, value, offsets * towards], axis=-1)
 
     def _looked_up(self, offsets: FloatArray, force: FloatArray | float) -> FloatArray:
         """Return the profiles at offsets and forces, (m, n, 4), interpolated."""
