@@ -69,12 +69,11 @@ def command(
     from memscal.extensions.arrays.sensor_array import load_array
 
     held = load_array(array)
-    read = read_frames(held, frames, options["u_unit"])
-    zero = None if rest is None else read_frames(held, rest, options["u_unit"]).u
+    u, carried = read_frames(held, frames, options["u_unit"])
+    zero = None if rest is None else read_frames(held, rest, options["u_unit"])[0]
     with out.working("Locating"):
-        contacts = held.locate(read.u, options["indenter"], options["shear"], zero)
-    number = contacts.frame if read.number is None else read.number
-    contacts = replace(contacts, frame=number, time=read.time)
+        contacts = held.locate(u, options["indenter"], options["shear"], zero)
+    contacts = replace(contacts, **carried)
     files = out.drawn(contacts, figures)
     if output is not None:
         files[output] = csv_text(contacts).encode("utf-8")

@@ -1,38 +1,31 @@
 """Frames of an array from a table: one row for each, one column for each sensor, by name."""
 
-from typing import NamedTuple
-
 import numpy as np
 
 from memscal.errors import FormatError
 from memscal.extensions.arrays.array_data import ArrayData
 from memscal.formats.files import FilePath
 from memscal.formats.tables.columns import Wanted
-from memscal.formats.tables.dialect import cut_head
 from memscal.formats.tables.sheets import open_table
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import FloatArray, Values
 from memscal.model.quantities import dimension_in
 
 #: Columns that are no readings.
 _CARRIED = ("frame", "t")
 
 
-class Frames(NamedTuple):
-    """Readings (frames, sensors), and the number and the time of each frame where they stand."""
+def read_frames(
+    array: ArrayData, path: FilePath, u_unit: str | None = None
+) -> tuple[FloatArray, Values]:
+    """Return readings (frames, sensors), and ``frame`` and ``time`` where they stand in a table.
 
-    u: FloatArray
-    number: FloatArray | None
-    time: FloatArray | None
-
-
-def read_frames(array: ArrayData, path: FilePath, u_unit: str | None = None) -> Frames:
-    """Read frames, their columns in the order of the sensors; refuse those of another array."""
+    Its columns may be in any order; those of another array are refused.
+    """
     table = open_table(path)
-    heads = {cut_head(name)[0]: name for name in table.names}
-    lacking = [name for name in array.sensors if name not in heads]
-    others = [name for name in heads if name not in (*array.sensors, *_CARRIED)]
+    lacking = [name for name in array.sensors if name not in table.heads]
+    others = [name for name in table.heads if name not in (*array.sensors, *_CARRIED)]
     if lacking or others:
-        count = len(heads.keys() - {*_CARRIED})
+        count = len({*table.heads} - {*_CARRIED})
         raise FormatError(
             f"{path} has {count} columns of readings, but the array has {len(array.sensors)} "
             f"sensors. Without a column: {', '.join(lacking) or 'none'}. Columns of no sensor: "
@@ -44,12 +37,12 @@ def read_frames(array: ArrayData, path: FilePath, u_unit: str | None = None) -> 
     of_u = dimension_in("voltage", array.reading)
     wanted = {}
     for name in array.sensors:
-        unit = table.unit_of(heads[name], u_unit, "u_unit (--u-unit)")
-        wanted[name] = Wanted(heads[name], unit, of_u)
-    if "frame" in heads:
-        wanted["frame"] = Wanted(heads["frame"])
-    if "t" in heads:
-        wanted["t"] = Wanted(heads["t"], table.unit_of(heads["t"], None, "t", "s"), "time")
-    columns = table.columns(wanted)
-    u = np.column_stack([columns[name] for name in array.sensors])
-    return Frames(u, columns.get("frame"), columns.get("t"))
+        unit = table.unit_of(name, u_unit, "u_unit (--u-unit)")
+        wanted[name] = Wanted(name, unit, of_u)
+    if "frame" in table.heads:
+        wanted["frame"] = Wanted("frame")
+    if "t" in table.heads:
+        wanted["time"] = Wanted("t", table.unit_of("t", None, "t", "s"), "time")
+    carried: Values = {**table.columns(wanted)}
+    u = np.column_stack([carried.pop(name) for name in array.sensors])
+    return u, carried

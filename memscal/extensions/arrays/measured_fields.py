@@ -74,8 +74,7 @@ class MeasuredFields:
         """Readings (m, n), and their derivatives by x, y, presses and two shears, (m, n, 5)."""
         h, by_x, by_y = self.normal(places)
         scale = force[:, None]
-        none = np.zeros_like(h)
-        return scale * h, np.stack([scale * by_x, scale * by_y, h, none, none], axis=-1)
+        return scale * h, np.stack([scale * by_x, scale * by_y, h, 0 * h, 0 * h], axis=-1)
 
     def errors(self, _: FloatArray, force: FloatArray, *__: Any) -> FloatArray:
         """Changes of the readings by one u of each map, (m, n, n)."""
