@@ -19,8 +19,8 @@ def require_schema(file: SafeFile, schema: str) -> str:
         if stored == writer.ARRAY_SCHEMA:
             cure = (
                 "It is that of an array of sensors, for `memscal locate` and memscal.load_array; "
+                "an artifact of one of them is array.sensor(name)."
             )
-            cure += "an artifact of one of them is array.sensor(name)."
         raise FormatError(
             f'{file.name} has {held}, but "{schema}" is needed here.',
             why=f"The root attribute {writer.SCHEMA_ATTRIBUTE} names what a file holds.",
