@@ -164,34 +164,6 @@ _DECAYED = 45.0
 _BASE_STRESS_CHUNK = 128
 
 
-def base_spectrum(
-    film: ElasticFilm, traction: InterfaceTraction, k: FloatArray, *, order: int = 0
-) -> FloatArray:
-    r"""Return :math:`T\hat p - N\hat q`; of ``order`` one :math:`-(S\hat p + R\hat q)`; in N."""
-    x = k * film.thickness
-    p = traction.pressure_transform(k)
-    q = traction.shear_transform(k)
-    by_pressure, by_shear = base_response(x, film.poisson_ratio, order)
-    return -(by_pressure * p + by_shear * q) if order else by_pressure * p - by_shear * q
-
-
-def base_stress(
-    film: ElasticFilm, traction: InterfaceTraction, r: FloatArray, *, order: int = 0
-) -> FloatArray:
-    """Return stress, or of ``order`` one traction, at the base (Pa), to 1e-13 of the peak."""
-    flat = np.ravel(r)
-    inside = np.flatnonzero(flat <= traction.radius + _DECAYED * film.thickness)
-    sorting = inside[np.argsort(flat[inside], kind="stable")]
-    stress = np.zeros_like(flat)
-    for some in slices(sorting.size, _BASE_STRESS_CHUNK):
-        chunk = sorting[some]
-        # The integrand turns at the rate r (Bessel function) + radius (transform of the traction).
-        k, weights = _wavenumbers(film, flat[chunk[-1]] + traction.radius)
-        density = weights * k * base_spectrum(film, traction, k, order=order)
-        stress[chunk] = bessel(order, np.outer(flat[chunk], k)) @ density
-    return stress.reshape(np.shape(r))
-
-
 @array_record
 class RingTraction:
     """Pressure and outward shear (Pa) linear between rings (m, from 0), zero beyond the last."""
@@ -295,11 +267,31 @@ class HankelField:
 
     def base(self, r: FloatArray, order: int) -> FloatArray:
         """Return normal stress or outward traction at the base in Pa."""
-        return base_stress(self.film, self.traction, r, order=order)
+        flat = np.ravel(r)
+        reach = self.traction.radius
+        inside = np.flatnonzero(flat <= reach + _DECAYED * self.film.thickness)
+        sorting = inside[np.argsort(flat[inside], kind="stable")]
+        stress = np.zeros_like(flat)
+        for some in slices(sorting.size, _BASE_STRESS_CHUNK):
+            chunk = sorting[some]
+            # The integrand turns at the rate r (Bessel function) + reach (the transform).
+            k, weights = _wavenumbers(self.film, flat[chunk[-1]] + reach)
+            density = weights * k * self._transform(k, order)
+            stress[chunk] = bessel(order, np.outer(flat[chunk], k)) @ density
+        return stress.reshape(np.shape(r))
 
     def spectrum(self, k: FloatArray, order: int) -> FloatArray:
         """Return the transform of normal stress or traction at ``k`` (rad/m), in N."""
-        return 2 * np.pi * base_spectrum(self.film, self.traction, k, order=order)
+        return 2 * np.pi * self._transform(k, order)
+
+    def _transform(self, k: FloatArray, order: int) -> FloatArray:
+        r"""Return :math:`T\hat p - N\hat q`; of order one :math:`-(S\hat p + R\hat q)`; in N."""
+        by_pressure, by_shear = base_response(
+            k * self.film.thickness, self.film.poisson_ratio, order
+        )
+        pressed = by_pressure * self.traction.pressure_transform(k)
+        sheared = by_shear * self.traction.shear_transform(k)
+        return -(pressed + sheared) if order else pressed - sheared
 
     def surface(self, r: FloatArray, order: int) -> FloatArray:
         """Return depression or outward displacement of the surface in m."""

@@ -29,7 +29,7 @@ from memscal.axisymmetry.hankel import gauss_panels
 from memscal.errors import ConvergenceError, DomainError
 from memscal.mechanics.film_response import (
     HalfSpaceIntegrals,
-    base_stress,
+    HankelField,
     corrections,
     half_space_coupling,
 )
@@ -253,7 +253,8 @@ def _largest_change(fine: RodSolution, coarse: RodSolution, ratio: float, nu: fl
     h = 2.0**-10
     film = ElasticFilm(young_modulus=2.0**20, poisson_ratio=nu, thickness=h)
     r = h * np.linspace(0.0, ratio + 4.0, 60)
-    new, old = (base_stress(film, rod.traction(h * ratio, 1.0), r) for rod in (fine, coarse))
+    tractions = (rod.traction(h * ratio, 1.0) for rod in (fine, coarse))
+    new, old = (HankelField(film, traction).base(r, 0) for traction in tractions)
     by_stress = np.max(abs(new - old)) / np.max(abs(new))
     return float(max(by_stress, abs(fine.stiffness_factor / coarse.stiffness_factor - 1)))
 
