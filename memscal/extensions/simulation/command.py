@@ -7,6 +7,7 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from inspect import signature
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -135,9 +136,7 @@ def _print_truth(scans: Mapping[Path, Scan], title: str) -> None:
     from memscal.extensions.simulation.sensor_array import OF_SENSORS
 
     truths = [dict(scan.synthetic or {}) for scan in scans.values()]
-    names: dict[str, None] = {}
-    for truth in sorted(truths, key=len, reverse=True):
-        names |= dict.fromkeys(truth)
+    names = dict.fromkeys(chain(*sorted(truths, key=len, reverse=True)))
     rows: list[Sequence[str]] = [
         ("kind", *(scan.kind for scan in scans.values())),
         ("points", *(" x ".join(map(str, scan.u_zz.shape)) for scan in scans.values())),
@@ -171,8 +170,10 @@ def _described(scan: Scan, path: Path) -> Options:
 
 def _member(name: str, value: float | str) -> Any:
     """Return a truth as JSON holds it: text, also of what is infinite, or a number and its unit."""
-    if isinstance(value, str) or value == math.inf or name == "seed":
-        return int(value) if name == "seed" else str(value)
+    if name == "seed":
+        return int(value)
+    if isinstance(value, str) or value == math.inf:
+        return str(value)
     quantity = _quantity(name)
     return {"value": value / quantity.scale, "unit": quantity.unit_text}
 
@@ -301,10 +302,8 @@ def command(
     from memscal.formats.scan import write_scan
     from memscal.model.instrument import StressSensor
 
-    loads = options["loads"] or (1.0,)
     with working("Simulating"):
-        load = loads[0] if len(loads) == 1 else loads
-        scan = simulate(load=load, **_settings(simulate, options))
+        scan = simulate(load=options["loads"] or 1.0, **_settings(simulate, options))
     if laboratory:
         scan = with_laboratory(laboratory, replace(scan, sensor=StressSensor()))
     with together():

@@ -213,7 +213,14 @@ def simulate_experiment(
     truth = {"conversion_constant": conversion_constant, "gain": gain, "seed": float(seed)}
     if shear is not None:
         truth["conversion_constant_xz"] = shear[1]
-    rod_truth = {**_rod_truth(true, rod_load), **truth, "gain": 1.0}
+    rod_truth = {
+        **described_film(true.film),
+        "indenter_radius": true.rod.radius,
+        "load_scale": true.rod_load_scale,
+        "load_1": true.rod_load_scale * rod_load,
+        **truth,
+        "gain": 1.0,
+    }
     u = disturbances.load_uncertainty
     nominal = replace(calibration, load=rod_load, load_uncertainty=u and u * rod_load)
     cell = LoadCell(name="a simulated load cell" if disturbances.one_load_cell else "")
@@ -223,16 +230,6 @@ def simulate_experiment(
         dry=_as_stated(dry, truth, indenter=sphere, **stated),
         lubricated=_as_stated(lubricated, truth, indenter=sphere, **stated),
     )
-
-
-def _rod_truth(true: Reality, rod_load: float) -> dict[str, float]:
-    """Return what was pressed in the rod scan, by the names of a truth."""
-    return {
-        **described_film(true.film),
-        "indenter_radius": true.rod.radius,
-        "load_scale": true.rod_load_scale,
-        "load_1": true.rod_load_scale * rod_load,
-    }
 
 
 def _true(stated: Reality, disturbances: Disturbances, seed: int) -> Reality:
