@@ -500,14 +500,10 @@ def _loads(
     tested = measured.noise_stated
     for i, profile in enumerate(measured.profiles):
         by_loading = {loading: load_comparison(profile, fit, i) for loading, fit in fits.items()}
-        maxima = {loading: load.by_maximum for loading, load in by_loading.items()}
-        maxima = with_loading(maxima, tested=tested)
-        profiles = {loading: load.by_profile for loading, load in by_loading.items()}
-        profiles = with_loading(profiles, tested=tested)
-        for loading, load in by_loading.items():
-            by_loading[loading] = replace(
-                load, by_maximum=maxima[loading], by_profile=profiles[loading]
-            )
+        for name in ("by_maximum", "by_profile"):
+            read = {loading: getattr(load, name) for loading, load in by_loading.items()}
+            for loading, counted in with_loading(read, tested=tested).items():
+                by_loading[loading] = replace(by_loading[loading], **{name: counted})
         loads.append(by_loading)
     return {loading: tuple(load[loading] for load in loads) for loading in fits}
 
