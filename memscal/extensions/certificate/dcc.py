@@ -23,14 +23,18 @@ from memscal.model.quantities import DIMENSIONS, PER_MM
 from memscal.version import __version__
 
 _CONSTANT = Path(__file__).with_name("dcc.xml")
-_SPACES = {"dcc": "https://ptb.de/dcc", "si": "https://ptb.de/si"}
+_SPACES = {
+    "dcc": "https://ptb.de/dcc",
+    "si": "https://ptb.de/si",
+    "xsi": "http://www.w3.org/2001/XMLSchema-instance",
+}
 #: Elements by their names: text, a tree of more, or a list of such, one after the other.
 Tree = Mapping[str, Any]
 
 
 def certificate_xml(certificate: Certificate) -> bytes:
     """Return a certificate as a Digital Calibration Certificate, in UTF-8."""
-    for prefix, space in {**_SPACES, "xsi": "http://www.w3.org/2001/XMLSchema-instance"}.items():
+    for prefix, space in _SPACES.items():
         ET.register_namespace(prefix, space)
     root = ET.fromstring(_CONSTANT.read_bytes())
     fields = fields_of(certificate) | _beside_the_page(certificate)

@@ -284,8 +284,7 @@ def _kept_rows(batch: Batch, shard: Shard) -> list[Values]:
 
 def _digest(batch: Batch, shard: Shard, inputs: list[str | None]) -> str:
     """Return the digest of version, options, and of the contents and places of the scans."""
-    made = batch.version, FLEET_SCHEMA_VERSION, batch.options_sha256, shard, inputs
-    return _sha256_of(made)
+    return _sha256_of((batch.version, FLEET_SCHEMA_VERSION, batch.options_sha256, shard, inputs))
 
 
 def _sha256_of_file(path: Path) -> str | None:

@@ -1,7 +1,5 @@
 """Records of laws of the interface: their evidence, the slip length, and what it means."""
 
-from dataclasses import field
-
 from scipy.special import chdtrc
 
 from memscal.friction.results import BoundedEstimate
@@ -108,7 +106,7 @@ class InterfaceComparison(Shown):
     macroscopic: tuple[float, float | None]
     tangential: LawComparison | None
     normal: LawComparison | None
-    messages: tuple[Message, ...] = field(default=())
+    messages: tuple[Message, ...] = ()
 
     def __repr__(self) -> str:
         """Return the length of each law that yields."""

@@ -39,10 +39,11 @@ def mapping(seen: Response) -> Values:
 def answer(seen: Response) -> str:
     """Return which waves are resolved, and from which speed on drift does not rule."""
     shortest = 2 * math.pi / seen.apparatus.resolved_wavenumber
-    lines = [
+    resolved = (
         f"Under a film of {seen.film.thickness / MM:.4g} mm the calibration resolves waves of "
-    ]
-    lines[0] += f"{shortest / MM:.3g} mm or longer."
+        f"{shortest / MM:.3g} mm or longer."
+    )
+    lines = [resolved]
     noise = seen.noise_record
     if noise is not None and np.any(seen.frequency < noise.corner):
         lines.append(f"Below {noise.corner:.3g} Hz drift rules the noise: move faster.")
