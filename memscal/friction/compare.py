@@ -4,7 +4,6 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from os import PathLike
 
 import numpy as np
 
@@ -14,6 +13,7 @@ from memscal.estimation.points import measured_mask
 from memscal.estimation.set_up import accepted_differences
 from memscal.extensions import hook
 from memscal.formats.cache import CacheFolder
+from memscal.formats.files import FilePath
 from memscal.formats.opened import Contacts, opened_contacts
 from memscal.friction.calculated import FRICTIONS, amontons_family, external_family
 from memscal.friction.checks import comparison_checks, comparison_messages, synthetic_messages
@@ -129,7 +129,7 @@ _MM = 1e-3
 @single_threaded()
 def compare(
     contacts: Contacts,
-    apparatus: ApparatusFunction | str | PathLike[str],
+    apparatus: ApparatusFunction | FilePath,
     *,
     friction: Sequence[float] | None = None,
     loading: Loading | Sequence[Loading] = ("incremental", "total"),
@@ -137,11 +137,11 @@ def compare(
     lubricated: str | None = None,
     lubricated_friction: float = LUBRICATED_FRICTION,
     between_scan_gain: float = BETWEEN_SCAN_GAIN,
-    shear: ApparatusFunction | str | PathLike[str] | None = None,
+    shear: ApparatusFunction | FilePath | None = None,
     macroscopic: float | None = None,
     macroscopic_uncertainty: float | None = None,
     interface: bool = False,
-    noise_record: Scan | str | PathLike[str] | None = None,
+    noise_record: Scan | FilePath | None = None,
     override: bool = False,
     accept_altered: bool = False,
     cache: CacheFolder = None,

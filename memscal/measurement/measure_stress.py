@@ -4,12 +4,12 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import chain
-from os import PathLike
 
 import numpy as np
 
 from memscal.apparatus import ApparatusFunction, opened_apparatus
 from memscal.errors import FitError, InputError
+from memscal.formats.files import FilePath
 from memscal.formats.opened import Scans, opened_scans, require_different
 from memscal.measurement import measured_profile as one_load
 from memscal.measurement import restore
@@ -122,9 +122,9 @@ _GIVEN_ONCE = (FAILED_CHECK, FAILED_CALIBRATION, NOISE_UNSTATED)
 @single_threaded()
 def measure_stress(
     scan: Scans,
-    apparatus: ApparatusFunction | str | PathLike[str],
+    apparatus: ApparatusFunction | FilePath,
     *,
-    noise_record: Scan | str | PathLike[str] | None = None,
+    noise_record: Scan | FilePath | None = None,
     override: bool = False,
     accept_altered: bool = False,
     progress: Listener = None,  # noqa: ARG001 - @reported

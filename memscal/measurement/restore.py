@@ -26,6 +26,7 @@ from memscal.estimation.residuals import (
     scatter_of_means,
 )
 from memscal.estimation.set_up import accepted_differences, file_in_words, stated_differences
+from memscal.formats.files import FilePath
 from memscal.formats.opened import opened_scan
 from memscal.formats.reference import read_reference
 from memscal.measurement.posterior import film_transfer, posterior_of, reach_of, sensor_changes
@@ -361,12 +362,12 @@ def noise_unstated_message(noise: str) -> Message:
 @reported
 @single_threaded()
 def restore(
-    scan: Scan | str | PathLike[str],
-    apparatus: ApparatusFunction | str | PathLike[str],
+    scan: Scan | FilePath,
+    apparatus: ApparatusFunction | FilePath,
     *,
     load: float | None = None,
     expected: Expected = None,
-    noise_record: Scan | str | PathLike[str] | None = None,
+    noise_record: Scan | FilePath | None = None,
     override: bool = False,
     accept_altered: bool = False,
 ) -> Restoration:

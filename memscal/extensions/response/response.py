@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from memscal.apparatus import ApparatusFunction, opened_apparatus
 from memscal.errors import InputError
+from memscal.formats.files import FilePath
 from memscal.formats.scan import read_scan
 from memscal.measurement.posterior import alike_films, input_changes, sensor_changes
 from memscal.measurement.restore import require_covariance
@@ -169,13 +170,13 @@ class Response(Shown):
 
 
 def response(
-    apparatus: ApparatusFunction | str | PathLike[str],
+    apparatus: ApparatusFunction | FilePath,
     wavelength: ArrayLike,
     speed: ArrayLike | None = None,
     *,
     film: ElasticFilm | None = None,
     friction: float = 0.0,
-    noise_record: NoiseSpectrum | Scan | str | PathLike[str] | None = None,
+    noise_record: NoiseSpectrum | Scan | FilePath | None = None,
     length: float | None = None,
 ) -> Response:
     r"""Find what a calibrated sensor reads of waves of pressure on its film.
@@ -280,7 +281,7 @@ def _require_stress(apparatus: ApparatusFunction) -> None:
 
 
 def _noise_at_rest(
-    record: NoiseSpectrum | Scan | str | PathLike[str], apparatus: ApparatusFunction
+    record: NoiseSpectrum | Scan | FilePath, apparatus: ApparatusFunction
 ) -> NoiseSpectrum:
     """Return the spectrum of a noise record, or of its file, in the unit of a sensor's readings."""
     if isinstance(record, str | PathLike):
