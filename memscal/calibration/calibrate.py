@@ -309,8 +309,7 @@ def _propagated(
     if isinstance(solution.fields, RasterFields):
         from memscal.calibration.field_uncertainty import field_errors
 
-        plane = field_errors(solution, *inputs[:2])
-        results = replace(results, field_errors=plane)
+        results = replace(results, field_errors=field_errors(solution, *inputs[:2]))
     # Some checks are of the division, whichever the method.
     if (other or not results.division) and solution.other:
         return results, uncertainties(solution, solution.other, *inputs)

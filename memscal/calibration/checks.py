@@ -146,7 +146,8 @@ def _reconvolutions(solution: Solution) -> _Checks:
 def _constraint(solution: Solution) -> _Checks:
     """Compare a G that was kept from falling below zero, or from rising, with the free one."""
     estimate = solution.estimate
-    if not (isinstance(solution.method, Bayesian) and solution.method.constrained):
+    method = solution.method
+    if not (isinstance(method, Bayesian) and (method.nonnegative or method.monotone)):
         return
     points = estimate.points
     weights = estimate.weights / estimate.noise_scale**2

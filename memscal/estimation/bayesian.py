@@ -64,11 +64,6 @@ class Bayesian:
         "Detail finer than a third of G's width that the film hides is not found, only allowed for."
     )
 
-    @property
-    def constrained(self) -> bool:
-        """Whether a constraint is set."""
-        return self.nonnegative or self.monotone
-
 
 @array_record
 class _Sensors:
