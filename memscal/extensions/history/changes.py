@@ -15,8 +15,6 @@ distribution, of more degrees of freedom the less of the variance is :math:`\tau
 Satterthwaite; GUM, JCGM 100:2008, G.4.1).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

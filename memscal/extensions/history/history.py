@@ -1,11 +1,8 @@
 """The history of a sensor from the artifacts of its calibrations."""
 
-from __future__ import annotations
-
 from bisect import bisect
 from collections.abc import Hashable, Iterator, Sequence
 from datetime import UTC, datetime, timedelta
-from os import PathLike
 
 import numpy as np
 
@@ -19,6 +16,7 @@ from memscal.extensions.history.changes import (
     exceeded_after,
     fitted,
 )
+from memscal.formats.files import FilePath
 from memscal.formats.opened import require_different
 from memscal.model.apparatus import ParameterSet
 from memscal.model.arrays import (
@@ -149,7 +147,7 @@ class History(FrozenArrays, Shown):
 
 
 def history(
-    apparatuses: Sequence[str | PathLike[str] | ApparatusFunction],
+    apparatuses: Sequence[FilePath | ApparatusFunction],
     *,
     tolerance: float = 0.02,
     repairs: Sequence[str] = (),
@@ -272,7 +270,7 @@ def history(
     )
 
 
-def _read(given: str | PathLike[str] | ApparatusFunction) -> ApparatusFunction:
+def _read(given: FilePath | ApparatusFunction) -> ApparatusFunction:
     """Return an artifact that has a start time."""
     apparatus = given if isinstance(given, ApparatusFunction) else load_apparatus(given)
     if not apparatus.start_time:

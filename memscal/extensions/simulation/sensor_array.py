@@ -1,7 +1,5 @@
 """Simulated sensors in rows and columns under one film: places, constants, and crosstalk."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from memscal.extensions.simulation.sensor import Truth
