@@ -19,7 +19,14 @@ from memscal.estimation.forward import wave_table
 from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.smoothing import SmoothedProfile, rounded_reach
 from memscal.estimation.voltage_map import VoltageMap
-from memscal.model.arrays import ArrayFunction, FloatArray, IndexArray, array_record, value_record
+from memscal.model.arrays import (
+    ArrayFunction,
+    FloatArray,
+    IndexArray,
+    array_record,
+    floats,
+    value_record,
+)
 from memscal.model.places import EvenAxis
 from memscal.readings.find_places import even_lattice
 
@@ -274,4 +281,4 @@ def _continued(axis: EvenAxis, reach: float, extent: float) -> tuple[FloatArray,
     padding = math.ceil(max(2 * extent - reach, 0.0) / (2 * axis.step)) + 1
     count = steps + 1 + 2 * padding + steps % 2
     nodes = axis.start + axis.step * (np.arange(count) - padding)
-    return np.asarray(nodes, np.float64), axis.index + padding
+    return floats(nodes), axis.index + padding

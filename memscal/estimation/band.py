@@ -14,7 +14,7 @@ import numpy as np
 from memscal.axisymmetry.kernels import gaussian_transfer
 from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.smoothing import SmoothedProfile
-from memscal.model.arrays import TINY, FloatArray, value_record
+from memscal.model.arrays import TINY, FloatArray, floats, value_record
 
 #: A spectral component is relevant while it stands this many times above its noise: with the
 #: paper's tenth of the weakest one, noise and loss at the edge of the band are then about equal...
@@ -57,7 +57,7 @@ def find_band(estimate: ProfileEstimate, smoothed: SmoothedProfile | None) -> Ba
         noise = error * estimate.conversion_constant * reference
     elif estimate.points.as_raster:
         # Of all points of a raster the noise is equal at all wavenumbers.
-        noise = np.asarray(np.linalg.norm(_shares(estimate) * estimate.noise))
+        noise = floats(np.linalg.norm(_shares(estimate) * estimate.noise))
         clear = RELEVANT_OF_RASTER
     else:
         noise = smoothed.noise
@@ -124,7 +124,7 @@ def transfer_uncertainty(estimate: ProfileEstimate) -> FloatArray:
     a = estimate.conversion_constant
     rows = (basis.kernels(estimate.model.k) - np.outer(estimate.kernel / a, basis.integrals)) / a
     variance = np.sum((rows @ estimate.weighed.covariance) * rows, axis=1)
-    return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
+    return floats(np.sqrt(np.maximum(variance, 0.0)))
 
 
 def _falls_below(k: FloatArray, ratio: FloatArray, threshold: float) -> float:

@@ -32,7 +32,15 @@ from memscal.axisymmetry.hankel import ACROSS, RadialSpectrum, bessel, radial_sp
 from memscal.axisymmetry.kernels import gaussian_transfer
 from memscal.estimation.points import ScanPoints
 from memscal.estimation.voltage_map import BLOCK, DENSE
-from memscal.model.arrays import ArrayPair, ArrayTriple, BoolArray, FloatArray, array_record, slices
+from memscal.model.arrays import (
+    ArrayPair,
+    ArrayTriple,
+    BoolArray,
+    FloatArray,
+    array_record,
+    floats,
+    slices,
+)
 from memscal.model.sizes import too_large
 
 if TYPE_CHECKING:
@@ -229,7 +237,7 @@ class ForwardModel:
     @property
     def parabola(self) -> FloatArray:
         """Square of the distance from the middle of each scan over its half range, (n,)."""
-        return np.asarray(np.sum(self._within**2, axis=0))
+        return floats(np.sum(self._within**2, axis=0))
 
     @cached_property
     def straight_columns(self) -> FloatArray:
@@ -266,7 +274,7 @@ class ForwardModel:
         voltages = self._summed(geometry, self.points.order, kernel)
         if self.points.order == 0:
             return voltages
-        return np.asarray(-(geometry.towards[self.axis] * voltages.T).T)
+        return floats(-(geometry.towards[self.axis] * voltages.T).T)
 
     def framed(
         self, geometry: Geometry, first: Sequence[FloatArray]
@@ -304,7 +312,7 @@ class ForwardModel:
         """Derivative of :meth:`signal` by the distance from the centre, in V/m."""
         if self.points.order or not self.sums_waves:
             shift = self.shift_derivative(geometry, kernel)
-            return np.asarray(np.sum(geometry.towards * shift, axis=0))
+            return floats(np.sum(geometry.towards * shift, axis=0))
         return -self._summed(geometry, 1, (self.k * kernel.T).T)
 
     def shift_derivative(self, geometry: Geometry, kernel: FloatArray) -> FloatArray:
@@ -317,7 +325,7 @@ class ForwardModel:
         slope = self._summed(geometry, 0, self.k * kernel) - turn
         shift = geometry.towards[self.axis] * geometry.towards * (turn - slope)
         shift[self.axis] -= turn
-        return np.asarray(shift)
+        return floats(shift)
 
     def centre_derivative(self, geometry: Geometry, kernel: FloatArray) -> FloatArray:
         """Derivatives of :meth:`signal` by the free coordinates of all centres, shape (n, m)."""

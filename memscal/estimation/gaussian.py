@@ -16,7 +16,15 @@ from memscal.estimation.forward import ForwardModel, Geometry
 from memscal.estimation.outliers import robust_scale
 from memscal.estimation.points import ScanPoints
 from memscal.estimation.voltage_map import VoltageMap, evenly, triangular
-from memscal.model.arrays import TINY, ArrayPair, ArrayTriple, FloatArray, IndexArray, array_record
+from memscal.model.arrays import (
+    TINY,
+    ArrayPair,
+    ArrayTriple,
+    FloatArray,
+    IndexArray,
+    array_record,
+    floats,
+)
 
 _MOST_STEPS = 20
 _MOST_HALVINGS = 5
@@ -56,7 +64,7 @@ def gauss_newton(
         both = triangular(np.column_stack([slope * root[:, None], -residual * root]))
         whole = np.linalg.lstsq(both[:, :-1], both[:, -1])[0]
         longest = abs(whole).max()
-        step = np.asarray(whole * (_LONGEST_STEP / max(longest, _LONGEST_STEP)))
+        step = floats(whole * (_LONGEST_STEP / max(longest, _LONGEST_STEP)))
         place = place + step
         cost = loss
         if longest < tolerance:
@@ -265,7 +273,7 @@ class GaussianFit:
         information = standardised.T @ standardised + prior.T @ prior
         scale = np.sqrt(np.diag(information))
         inverse = np.linalg.inv(information / np.outer(scale, scale))
-        return np.asarray(noise**2 * inverse / np.outer(scale, scale))
+        return floats(noise**2 * inverse / np.outer(scale, scale))
 
     def gain(self, weights: FloatArray) -> VoltageMap:
         """Derivative of the parameters by the voltages, shape (p, n)."""

@@ -28,7 +28,7 @@ from memscal.estimation.outliers import (
 from memscal.estimation.plane import MOST_READINGS, Spots, plane_departures
 from memscal.estimation.points import ScanPoints
 from memscal.estimation.voltage_map import DENSE, VoltageMap, square_root
-from memscal.model.arrays import TINY, BoolArray, FloatArray, IndexArray, array_record
+from memscal.model.arrays import TINY, BoolArray, FloatArray, IndexArray, array_record, floats
 from memscal.model.checks import OUTLIER_WEIGHT, Message
 from memscal.progress import done_with
 
@@ -178,7 +178,7 @@ class ProfileEstimate:
     @property
     def centre(self) -> FloatArray:
         """Centre of the sensor (x0, y0) in the first scan, in m."""
-        return np.asarray(self.centres[0])
+        return floats(self.centres[0])
 
     @property
     def drifts(self) -> FloatArray:
@@ -238,7 +238,7 @@ class ProfileEstimate:
     @cached_property
     def distance(self) -> FloatArray:
         """Distance of each point from its scan's centre, shape (n,), in m."""
-        return np.asarray(np.hypot(*self.offset))
+        return floats(np.hypot(*self.offset))
 
     @cached_property
     def background(self) -> FloatArray:
@@ -599,7 +599,7 @@ def _least_distance(matrix: FloatArray, bound: FloatArray) -> FloatArray:
             why="It would have to be negative, or to rise, somewhere.",
             cure="Leave out the constraint: nonnegative=false, monotone=false.",
         )
-    return np.asarray(-residual[:-1] / residual[-1])
+    return floats(-residual[:-1] / residual[-1])
 
 
 #: Outliers that are listed one by one.

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from memscal.estimation.decorrelation import Decorrelation
-from memscal.model.arrays import ArrayPair, FloatArray, IndexArray, array_record, slices
+from memscal.model.arrays import ArrayPair, FloatArray, IndexArray, array_record, floats, slices
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
@@ -59,7 +59,7 @@ class VoltageMap:
 
     def __matmul__(self, values: FloatArray) -> FloatArray:
         """Changes (m,) or (m, q) of the numbers for changes (n,) or (n, q) of the voltages."""
-        return np.asarray(sum(left @ _gram(right, values) for left, right in self.parts))
+        return floats(sum(left @ _gram(right, values) for left, right in self.parts))
 
     def __rmatmul__(self, rows: FloatArray) -> VoltageMap:
         """Linear combinations of the numbers, by rows (l, m)."""
@@ -83,7 +83,7 @@ class VoltageMap:
 
     def dense(self) -> FloatArray:
         """All derivatives, (m, n)."""
-        return np.asarray(sum((right @ left.T).T for left, right in self.parts))
+        return floats(sum((right @ left.T).T for left, right in self.parts))
 
     def over(self, factors: FloatArray, rows: IndexArray, count: int) -> VoltageMap:
         """Derivatives by ``count`` voltages, of which these, times factors (n,), are ``rows``."""
@@ -135,7 +135,7 @@ def triangular(columns: FloatArray) -> FloatArray:
     root: Any = columns[:0]
     for rows in slices(len(columns), BLOCK):
         root = np.linalg.qr(np.vstack([root, columns[rows]]), mode="r")
-    return np.asarray(root)
+    return floats(root)
 
 
 def orthonormalised(
@@ -166,4 +166,4 @@ def square_root(covariance: FloatArray, variances: FloatArray | None = None) -> 
     with contextlib.suppress(np.linalg.LinAlgError):
         return safe[:, None] * np.linalg.cholesky(scaled)
     values, vectors = np.linalg.eigh(scaled)
-    return np.asarray(safe[:, None] * vectors * np.sqrt(np.maximum(values, 0.0)))
+    return floats(safe[:, None] * vectors * np.sqrt(np.maximum(values, 0.0)))

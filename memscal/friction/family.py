@@ -96,7 +96,7 @@ class ProfileFamily(FrozenArrays):
         """Derivatives of the spectra by the bounded coordinate, shape (M, L, K), in N."""
         if self.slopes is not None:
             return self.slopes
-        return np.asarray(self._interpolant(self.coordinates, 1)[:, 0])
+        return floats(self._interpolant(self.coordinates, 1)[:, 0])
 
     def at(self, values: ArrayLike) -> ProfileFamily:
         """Return the members at one or several values, in any order; none is extrapolated."""

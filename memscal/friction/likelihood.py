@@ -37,6 +37,7 @@ from memscal.model.arrays import (
     IndexArray,
     Values,
     array_record,
+    floats,
 )
 from memscal.model.measured_stress import MeasuredProfile, MeasuredScan
 from memscal.model.scan import Scan
@@ -404,7 +405,7 @@ class Noise:
         """Return W, with W N W^T = 1, in B blocks of readings that share noise: (V, B, m, m)."""
         if not self.shared:
             variance = np.sum([kind**2 for kind in self.kinds.values()], axis=0)
-            return np.asarray(1 / np.sqrt(variance))[..., None, None]
+            return floats(1 / np.sqrt(variance))[..., None, None]
         size = len(next(iter(self.shared.values())))
         covariance = np.zeros(())
         for name, kind in self.kinds.items():
@@ -562,7 +563,7 @@ class Likelihood:
             square = square + np.sum(load.slope**2, axis=-1)
             projection = projection + (load.slope[:, None] @ load.columns)[:, 0]
         prior = np.eye(information.shape[-1])
-        response = np.asarray(np.linalg.solve(information + prior, projection[..., None]))[..., 0]
+        response = floats(np.linalg.solve(information + prior, projection[..., None]))[..., 0]
         return square - np.sum(projection * response, axis=-1), response
 
     def budget(self) -> dict[str, float]:

@@ -50,6 +50,7 @@ from memscal.model.arrays import (
     ArrayTriple,
     FloatArray,
     array_record,
+    floats,
     value_record,
 )
 from memscal.model.film import LINEAR, NEO_HOOKEAN, ElasticFilm, more_and_less
@@ -118,8 +119,8 @@ def _three_orders(m: float, nodes: bytes, width: float) -> ArrayTriple:
         return same, same, same
     b = m + 2
     z = -b * (k * width) ** 2 / 2
-    first = np.asarray(hyp0f1(b + 1, z), np.float64)
-    second = np.asarray(hyp0f1(b + 2, z), np.float64)
+    first = floats(hyp0f1(b + 1, z))
+    second = floats(hyp0f1(b + 2, z))
     # Downwards the recurrence is stable (DLMF 10.6.1).
     own = first + z / (b * (b + 1)) * second
     return own, first, second
@@ -324,7 +325,7 @@ class Posterior:
     @property
     def covariance(self) -> FloatArray:
         """Covariance of the state, all sources together."""
-        return np.asarray(np.sum(list(self.covariances.values()), axis=0))
+        return floats(np.sum(list(self.covariances.values()), axis=0))
 
     @property
     def wavenumbers(self) -> Wavenumbers:

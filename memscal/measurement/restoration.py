@@ -124,7 +124,7 @@ class Restoration(Result, Checked):
         InputError
             If a radius is beyond 1.5 times the scan's width, where nothing was computed.
         """
-        return np.asarray(self._synthesis(r) @ self.posterior.stress)
+        return floats(self._synthesis(r) @ self.posterior.stress)
 
     def stress_uncertainty(self, r: ArrayLike) -> FloatArray:
         """Return the standard uncertainty (k = 1) of :meth:`stress`, in Pa."""
@@ -132,7 +132,7 @@ class Restoration(Result, Checked):
         nodes = self.posterior.nodes
         covariance = self.posterior.covariance[:nodes, :nodes]
         variance = np.einsum("...j,jk,...k->...", matrix, covariance, matrix)
-        return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
+        return floats(np.sqrt(np.maximum(variance, 0.0)))
 
     @property
     def force(self) -> float:
@@ -184,7 +184,7 @@ class Restoration(Result, Checked):
         """Distance of each point from the centre, shape (points,), in m."""
         dx = self.points.x - self.centre[0]
         dy = self.points.y - self.centre[1]
-        return np.asarray(np.hypot(dx, dy))
+        return floats(np.hypot(dx, dy))
 
     @property
     def predicted(self) -> FloatArray:
@@ -230,7 +230,7 @@ class Restoration(Result, Checked):
     def blurred_stress(self, r: ArrayLike) -> FloatArray:
         r"""Return the restored stress blurred again, :math:`G \otimes \sigma_{zz}`, in Pa."""
         transfer, _ = sensor_changes(self.apparatus, self.posterior.estimate.model.k)
-        return np.asarray(self._synthesis(r) @ (transfer * self.posterior.stress))
+        return floats(self._synthesis(r) @ (transfer * self.posterior.stress))
 
     def compare(self, expected: Expected) -> StressComparison:
         """Compare a calculated stress with the scan, blurred by G, and with the restored one.

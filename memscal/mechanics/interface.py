@@ -14,6 +14,7 @@ from scipy.special import gamma, pbdv
 
 from memscal.model.arrays import (
     FloatArray,
+    floats,
     keyword_value_record,
     require_non_negative,
     require_positive,
@@ -77,12 +78,12 @@ class GreenwoodTripp:
 
     def pressure(self, separation: FloatArray, film: ElasticFilm) -> FloatArray:
         """Return the pressure in Pa at a ``separation`` in m."""
-        return np.asarray(self._scale(film) * np.exp(_splines()[0](self._height(separation))))
+        return floats(self._scale(film) * np.exp(_splines()[0](self._height(separation))))
 
     def stiffness(self, separation: FloatArray, film: ElasticFilm) -> FloatArray:
         """Return minus the derivative of the pressure by the separation, in Pa/m."""
         slope = _splines()[0](self._height(separation), 1)
-        return np.asarray(-self.pressure(separation, film) * slope / self.roughness)
+        return floats(-self.pressure(separation, film) * slope / self.roughness)
 
     def separation(self, pressure: FloatArray, film: ElasticFilm) -> FloatArray:
         """Return the separation in m at which the pressure is ``pressure`` in Pa."""
@@ -91,7 +92,7 @@ class GreenwoodTripp:
         height = height_of(logarithm)
         # One step of Newton's method ties the inverse to the law itself.
         height += (logarithm - log_moment(height)) / log_moment(height, 1)
-        return np.asarray(self.roughness * np.clip(height, _CLOSEST, _FARTHEST))
+        return floats(self.roughness * np.clip(height, _CLOSEST, _FARTHEST))
 
     def _height(self, separation: FloatArray) -> FloatArray:
         return np.clip(separation / self.roughness, _CLOSEST, _FARTHEST)
@@ -234,4 +235,4 @@ def _gaussian_moment(t: FloatArray) -> FloatArray:
     deep = np.minimum(t, _DEEP)
     first = 3 / 8 / deep**2  # n (n - 1)/2
     second = first * 3 / 16 / deep**2  # (n - 2) (n - 3)/4
-    return np.asarray(np.where(t < _DEEP, (-deep) ** 1.5 * (1 + first + second), closed))
+    return floats(np.where(t < _DEEP, (-deep) ** 1.5 * (1 + first + second), closed))

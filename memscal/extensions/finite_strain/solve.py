@@ -33,7 +33,7 @@ from memscal.mechanics.film_response import RingTraction
 from memscal.mechanics.solver.refinement import RingRequest, relative_change
 from memscal.mechanics.solver.step import Depth, Load, Target
 from memscal.mechanics.surface import anticlockwise, on_hats
-from memscal.model.arrays import ArrayTriple, FloatArray, array_record, value_record
+from memscal.model.arrays import ArrayTriple, FloatArray, array_record, floats, value_record
 from memscal.model.field_mesh import FieldMesh
 from memscal.model.film import MOONEY_RIVLIN, NEO_HOOKEAN, ElasticFilm
 from memscal.model.indenter import Rod, Sphere
@@ -309,7 +309,7 @@ class FiniteStrainField:
             np.linalg.solve(_spline_masses(r, order), _without_axis(_on_corners(forces[which])))
             for order, which in enumerate((nodes + elements.n, nodes))
         )
-        return np.asarray(r[1:]) / _MM, np.asarray(normal * _MPA), np.asarray(shear * _MPA)
+        return floats(r[1:]) / _MM, floats(normal * _MPA), floats(shear * _MPA)
 
     @cached_property
     def displacements(self) -> ArrayTriple:
@@ -404,4 +404,4 @@ def _spline_masses(r: FloatArray, order: int) -> FloatArray:
     splines = radial_spline(r[1:], np.eye(r.size - 1), order=order)(nodes)
     hats = BSpline.design_matrix(nodes, np.pad(r, 1, mode="edge"), 1)
     masses = hats.T @ (splines * (2 * np.pi * nodes * weights)[:, None])
-    return _without_axis(np.asarray(masses))
+    return _without_axis(floats(masses))

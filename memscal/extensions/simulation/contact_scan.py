@@ -19,7 +19,7 @@ from memscal.friction.family import require_loads
 from memscal.mechanics.contact import Contact
 from memscal.mechanics.indent import indent
 from memscal.mechanics.interface import Interface
-from memscal.model.arrays import FloatArray, Values, require_positive, require_range
+from memscal.model.arrays import FloatArray, Values, floats, require_positive, require_range
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Sphere
 from memscal.model.scan import Scan
@@ -145,12 +145,12 @@ def _pressed(
 def _at_load(stresses: FloatArray, spread: float, ratio: FloatArray) -> FloatArray:
     """Return the stress at loads ``ratio`` over nominal, by the parabola in ln P through three."""
     if len(stresses) == 1:
-        return np.asarray(stresses[0])
+        return floats(stresses[0])
     below, middle, above = stresses
     t = np.log(ratio)
     slope = (above - below) / (2 * spread)
     bend = (above - 2 * middle + below) / spread**2
-    return np.asarray(middle + slope * t + 0.5 * bend * t**2)
+    return floats(middle + slope * t + 0.5 * bend * t**2)
 
 
 def described_film(film: ElasticFilm) -> dict[str, float]:
