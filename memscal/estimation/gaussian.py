@@ -358,9 +358,13 @@ def trust_region(linearise: Linearised, start: FloatArray, **options: Any) -> An
     """Minimise the loss of the residuals from anywhere, with a trust region."""
     from scipy.optimize import least_squares
 
-    return least_squares(
-        lambda place: linearise(place)[0], start, lambda place: linearise(place)[1], **options
-    )
+    def residual(place: FloatArray) -> FloatArray:
+        return linearise(place)[0]
+
+    def slope(place: FloatArray) -> FloatArray:
+        return linearise(place)[1]
+
+    return least_squares(residual, start, slope, **options)
 
 
 def linearise(model: ForwardModel, theta: FloatArray) -> GaussianFit:

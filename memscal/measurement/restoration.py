@@ -182,9 +182,7 @@ class Restoration(Result, Checked):
     @property
     def distance(self) -> FloatArray:
         """Distance of each point from the centre, shape (points,), in m."""
-        dx = self.points.x - self.centre[0]
-        dy = self.points.y - self.centre[1]
-        return floats(np.hypot(dx, dy))
+        return floats(np.hypot(*self.posterior.estimate.model.offset(self.centre)))
 
     @property
     def predicted(self) -> FloatArray:
