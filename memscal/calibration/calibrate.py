@@ -269,11 +269,8 @@ def calibrate(
     checks, explanations = explained(solution, checks)
     done_with("checks")
     laws = None if relative or solution.stress.form else weigh_laws(solution)
-    if not other:
-        by_other_route = None
-    apparatus = assemble(
-        prepared, solution, results, by_other_route, checks, laws, assumptions, explanations
-    )
+    told = by_other_route if other else None
+    apparatus = assemble(prepared, solution, results, told, checks, laws, assumptions, explanations)
     return Calibration(apparatus, solution, effects, dict(request.correlations))
 
 
