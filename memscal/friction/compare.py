@@ -503,7 +503,8 @@ def _loads(
         for name in ("by_maximum", "by_profile"):
             read = {loading: getattr(load, name) for loading, load in by_loading.items()}
             for loading, counted in with_loading(read, tested=tested).items():
-                by_loading[loading] = replace(by_loading[loading], **{name: counted})
+                change: Values = {name: counted}
+                by_loading[loading] = replace(by_loading[loading], **change)
         loads.append(by_loading)
     return {loading: tuple(load[loading] for load in loads) for loading in fits}
 

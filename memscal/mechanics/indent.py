@@ -5,6 +5,8 @@ from collections.abc import Sequence
 from functools import partial
 from typing import Literal, TypedDict, Unpack, overload
 
+import numpy as np
+
 from memscal.errors import InputError
 from memscal.extensions import hook
 from memscal.mechanics.contact import Contact, too_deep
@@ -13,7 +15,7 @@ from memscal.mechanics.interface import Interface
 from memscal.mechanics.rod import solve_rod
 from memscal.mechanics.solver.refinement import RingRequest, solve_on_rings
 from memscal.mechanics.solver.step import Depth, Load, Target
-from memscal.model.arrays import FloatArray, floats, require_positive
+from memscal.model.arrays import FloatArray, require_positive
 from memscal.model.film import LINEAR, ElasticFilm, more_and_less
 from memscal.model.indenter import Indenter, Rod
 from memscal.parallel import single_threaded
@@ -164,7 +166,7 @@ def indent(
             "Give either a load or a depth" + (", not both." if load is not None else "."),
             why="One follows from the other.",
         )
-    values = floats(load if depth is None else depth)
+    values = np.asarray(load if depth is None else depth, np.float64)
     if values.ndim > 1 or values.size == 0:
         raise InputError(f"The loads or depths have shape {values.shape}; give a flat list.")
     for value in values.flat:

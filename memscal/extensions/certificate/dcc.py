@@ -18,7 +18,7 @@ from memscal.extensions.certificate.certificate import (
 )
 from memscal.extensions.certificate.content import assumption_rows, fields_of, filled
 from memscal.formats.units import dsi_unit
-from memscal.model.arrays import FloatArray, Values, floats
+from memscal.model.arrays import FloatArray, Values
 from memscal.model.quantities import DIMENSIONS, PER_MM
 from memscal.version import __version__
 
@@ -120,7 +120,7 @@ def _real(value: float, unit: str) -> Tree:
 
 
 def _numbers(values: float | Iterable[float] | FloatArray) -> str:
-    numbers = np.atleast_1d(floats(values)).tolist()
+    numbers = np.atleast_1d(np.asarray(values, dtype=np.float64)).tolist()
     return " ".join(repr(number) if np.isfinite(number) else "NaN" for number in numbers)
 
 

@@ -404,4 +404,4 @@ def _spline_masses(r: FloatArray, order: int) -> FloatArray:
     splines = radial_spline(r[1:], np.eye(r.size - 1), order=order)(nodes)
     hats = BSpline.design_matrix(nodes, np.pad(r, 1, mode="edge"), 1)
     masses = hats.T @ (splines * (2 * np.pi * nodes * weights)[:, None])
-    return _without_axis(floats(masses))
+    return _without_axis(np.asarray(masses))
