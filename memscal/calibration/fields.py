@@ -253,8 +253,7 @@ class RasterFields:
         # Odd, so that the kernel's zero stays a point of the lattice.
         least = math.ceil(step / (2.0 * self.step)) | 1
         finer = math.ceil(step / (2.0 / 3 * self.step)) | 1
-        refinement = max(min(5, finer), least)
-        fine, values = self.grid.refined(kernel, refinement)
+        fine, values = self.grid.refined(kernel, max(min(5, finer), least))
         if profile:
             values = self._lifted(profile.radial, fine)
         inside_x = abs(fine.x) <= self.support

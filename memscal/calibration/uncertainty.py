@@ -312,12 +312,12 @@ def propagate(
     scatter = np.hstack(drawn_again)
     g_over_a = g / deconvolution.conversion_constant
     kernel_changes = {}
-    for source in effects if not correlations else ():
-        change = columns[source][:stop, 0]
-        kernel_changes[source] = change[count:] + g_over_a * change[0]
     shared: Arrays = {}
     if not correlations:
         shared = _shared_effects(solution, deconvolution, names, columns)
+        for source in effects:
+            change = columns[source][:stop, 0]
+            kernel_changes[source] = change[count:] + g_over_a * change[0]
     return Results(
         parameters=ParameterSet(names, values, stored[:count, :count]),
         changes={source: columns[source][:count, 0] for source in effects},

@@ -66,8 +66,7 @@ class Spots:
         )
         half = np.ceil(_CUT * np.sqrt(axes[1]) / step)
         axis = step * np.arange(-half, half + 1)
-        lattice = np.stack(np.meshgrid(axis, axis), axis=-1)
-        used = _ellipses(fit, lattice) < _CUT
+        used = _ellipses(fit, np.stack(np.meshgrid(axis, axis), axis=-1)) < _CUT
         count = used.sum()
         every = cls(axis, used, _BLUR * step, np.eye(count))
         volts = fit.points.standardised(every.signal(model, fit.centre), weights)

@@ -79,13 +79,10 @@ def _draw_maxima(axes: Axes, comparison: FrictionComparison, loading: str) -> No
         line.set_gid(f"mu={mu:g}")
     for lubrication in dict.fromkeys(at_load.lubrication for at_load in compared):
         measured = [at_load for at_load in compared if at_load.lubrication == lubrication]
-        x = [at_load.load for at_load in measured]
-        ratio = [at_load.ratio for at_load in measured]
-        bars = [coverage() * at_load.ratio_uncertainty for at_load in measured]
         axes.errorbar(
-            x,
-            ratio,
-            bars,
+            [at_load.load for at_load in measured],
+            [at_load.ratio for at_load in measured],
+            [coverage() * at_load.ratio_uncertainty for at_load in measured],
             ms=4,
             mew=0.8,
             ls="none",

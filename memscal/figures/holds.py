@@ -42,13 +42,10 @@ def holds_figure(holds: Holds) -> Figure:
         panels[-2].set_xlabel("line of the file")
         axes = panels[-1]
         along = "y" if np.ptp(mean.get("y", 0.0)) > np.ptp(mean["x"]) else "x"
-        x = mean[along] / MM
-        u = mean["u_zz"] / reading.scale
-        bars = 2 * holds.u_errors / reading.scale
         axes.errorbar(
-            x,
-            u,
-            bars,
+            mean[along] / MM,
+            mean["u_zz"] / reading.scale,
+            2 * holds.u_errors / reading.scale,
             color=MEASURED,
             fmt="o",
             ms=marker_size(first.size),

@@ -60,8 +60,7 @@ class FrictionFit:
         spread = _HALF_NORMAL_DEVIATION * width
 
         def near(value: float) -> Likelihood:
-            coordinate = bounded(value, family.scale)
-            mean = float(np.interp(coordinate, along.coordinates, means))
+            mean = float(np.interp(bounded(value, family.scale), along.coordinates, means))
             by_coordinate = _stretch(mean, family.scale)
             held = self._near(lubricated)(mean)
             return self._near(chosen)(value).with_held(held, spread / by_coordinate)

@@ -264,8 +264,7 @@ def _slope(signal: ContactSignal, found: _Found) -> FloatArray:
     free, stuck = (np.interp(found.distance[nearest], signal.r, u) for u in signal.voltage)
     sticking = 0.0
     if stuck > free:
-        above = found.signal[nearest] - free
-        sticking = np.clip(above / (stuck - free), 0.0, 1.0)
+        sticking = np.clip((found.signal[nearest] - free) / (stuck - free), 0.0, 1.0)
     sliding, stuck = signal.by_load
     return np.asarray((1 - sticking) * sliding + sticking * stuck)
 

@@ -314,8 +314,7 @@ class FilmElements:
         squeeze = cofactor(F)[..., None, :] * volumes[..., None, None] @ gradients
         against = -pressures.transpose(0, 2, 1)
         couple = against @ squeeze[:, :, 0]
-        weighted = pressures * (self.material.softness * volumes)[..., None]
-        soft = against @ weighted
+        soft = against @ (pressures * (self.material.softness * volumes)[..., None])
         whole = np.block([[stiff, couple.transpose(0, 2, 1)], [couple, soft]])
         count = dofs.shape[1]
         entries = (np.repeat(dofs, count, axis=1).ravel(), np.tile(dofs, count).ravel())

@@ -149,8 +149,7 @@ class Pressing:
             elif moved < _SETTLED * elements.thickness:
                 if elements.is_inside_out(state.x):
                     break
-                load = -float(np.sum(forces[state.touching + elements.n]))
-                return replace(state, load=load)
+                return replace(state, load=-float(np.sum(forces[state.touching + elements.n])))
             elif not near:
                 tangent = None
         raise NewtonError(f"No equilibrium was found near a depth of {state.depth:.4g} mm.")

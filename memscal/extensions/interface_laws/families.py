@@ -129,8 +129,7 @@ def family_at_loads(
 
     def apart(family: ProfileFamily) -> FloatArray:
         """Distances of logarithms of the loads, (profiles, loads of the family)."""
-        ratios = np.divide.outer(loads, family.loads)
-        return np.asarray(np.abs(np.log(ratios)))
+        return np.asarray(np.abs(np.log(np.divide.outer(loads, family.loads))))
 
     if calculated is None or np.any(apart(calculated).min(axis=1) > _NEAR):
         distinct: list[float] = []
