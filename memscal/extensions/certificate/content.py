@@ -226,9 +226,10 @@ def _others(certificate: Certificate) -> Made:
 def _profile(certificate: Certificate) -> Made:
     r, g, covariance = certificate.profile
     expanded = COVERAGE_FACTOR * np.sqrt(np.diag(covariance))
-    rows: Rows = []
-    for radius, value, u in zip(r / MM, g / PER_MM2, expanded / PER_MM2, strict=True):
-        rows.append([f"{radius:.4g}", format_measured(value, u)])
+    rows: Rows = [
+        [f"{radius:.4g}", format_measured(value, u)]
+        for radius, value, u in zip(r / MM, g / PER_MM2, expanded / PER_MM2, strict=True)
+    ]
     return (), rows
 
 

@@ -62,16 +62,15 @@ def tables(history: History) -> list[Table]:
 
 def mapping(history: History) -> Values:
     """Return the object of ``history --json``; the contract fixes changes, trend, next_date."""
-    dates = []
-    for i, found in enumerate(history.parameters):
-        dates.append(
-            {
-                "start_time": history.times[i],
-                "film": history.films[i],
-                "repairs_before": history.segment[i],
-                **parameters_json(found),
-            }
-        )
+    dates = [
+        {
+            "start_time": history.times[i],
+            "film": history.films[i],
+            "repairs_before": history.segment[i],
+            **parameters_json(found),
+        }
+        for i, found in enumerate(history.parameters)
+    ]
     return {
         "schema_version": "1",
         "sensor": history.sensor,

@@ -110,15 +110,16 @@ def _between(ends_about_best: FloatArray) -> str:
 
 def mapping(comparison: InterfaceComparison) -> Values:
     """Return laws, evidence and lengths as JSON holds them."""
-    whole = {}
-    for direction, compared in comparison.by_direction.items():
-        whole[direction] = {
+    whole = {
+        direction: {
             **members(COMPARED_LAWS, compared),
             "laws": [_held(_LAW, law) | members(ESTIMATE_FIT[1:], law) for law in compared.laws],
             "bayes_factors": [_held(_FACTOR, factor) for factor in compared.factors],
             "length": bounded_json(SLIP_LENGTH, compared.length),
             "implied": None if compared.implied is None else _implied_json(compared.implied),
         }
+        for direction, compared in comparison.by_direction.items()
+    }
     return whole | {"warnings": texts_of(comparison.messages)}
 
 

@@ -379,9 +379,10 @@ def monte_carlo(
     samples, g = np.split(np.array(rows), [len(BUDGETED)], axis=1)
     expected = expected_values(solution)
     deconvolution = solution.deconvolution
-    comparisons = []
-    for name, column in zip(BUDGETED, samples.T, strict=True):
-        comparisons.append(_compared(calibration, name, expected[name], column))
+    comparisons = [
+        _compared(calibration, name, expected[name], column)
+        for name, column in zip(BUDGETED, samples.T, strict=True)
+    ]
     first_order = uncertainties(solution, deconvolution, effects, calibration.correlations)
     curved = [CURVATURE] if solution.estimate.points.curved.size else []
     return MonteCarlo(

@@ -51,10 +51,11 @@ def mapping(result: MonteCarlo) -> Values:
 
 def _comparison_json(comparison: BudgetComparison, result: MonteCarlo) -> Values:
     quantity = estimated_quantity(comparison.name).read_in(result.reading)
-    values = {}
-    for name, number in vars(comparison).items():
-        if name not in ("name", "reason"):
-            values[_KEYS.get(name, name)] = plain(number, quantity.scale)
+    values = {
+        _KEYS.get(name, name): plain(number, quantity.scale)
+        for name, number in vars(comparison).items()
+        if name not in ("name", "reason")
+    }
     return {
         **values,
         "unit": quantity.unit_text,

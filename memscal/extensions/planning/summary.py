@@ -110,13 +110,14 @@ def mapping(planned: Design) -> Values:
         wanted[name] = {"value": value, "unit": "1"}
         if name == "resolved":
             wanted[name] = {"value": value / PER_MM, "unit": "rad/mm"}
-    expected = {}
-    for name in _SHOWN:
-        expected[name] = {
+    expected = {
+        name: {
             **declared.parameter_json(planned.parameters, name),
             "relative_uncertainty": planned.relative_uncertainty(name),
             "budget": declared.plain(planned.budget[name], ESTIMATED[name].scale),
         }
+        for name in _SHOWN
+    }
     return {
         "schema_version": "1",
         "planned": True,
