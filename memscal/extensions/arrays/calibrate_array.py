@@ -170,15 +170,7 @@ def calibrate_array(
     >>> bool(abs(array.crosstalk[0, 1] - 0.01) < 0.005)
     True
     """
-    opened = scan
-    if not isinstance(opened, Scan):
-        opened = read_scan(opened, accept_altered=accept_altered)
-    if not opened.sensors:
-        raise InputError(
-            "The scan is that of a single sensor, not of an array.",
-            why="An array names its sensors (Scan(sensors=...), memscal import --u 'u_*').",
-            cure="Calibrate it with memscal.calibrate.",
-        )
+    opened = _opened(scan, accept_altered=accept_altered)
     require_names("There is no kernel", [kernel], get_args(KernelModel))
     if kernel == "measured":
         from memscal.extensions.arrays.measured_array import measured_array
@@ -232,6 +224,18 @@ def calibrate_array(
         input_scan=opened.source,
     )
     return ArrayCalibration(replace(array, checks=checks, failing=failing, process=process), fit)
+
+
+def _opened(scan: Scan | str | PathLike[str], *, accept_altered: bool) -> Scan:
+    """Return the scan of an array, given itself or as a path; refuse that of a single sensor."""
+    opened = scan if isinstance(scan, Scan) else read_scan(scan, accept_altered=accept_altered)
+    if not opened.sensors:
+        raise InputError(
+            "The scan is that of a single sensor, not of an array.",
+            why="An array names its sensors (Scan(sensors=...), memscal import --u 'u_*').",
+            cure="Calibrate it with memscal.calibrate.",
+        )
+    return opened
 
 
 def _presses(
@@ -450,14 +454,7 @@ def _array(scan: Scan, prepared: Prepared, found: Sorted, fit: JointFit) -> Sens
         film=first.set_up.film,
         indenter=rod,
         load=first.stated_load,
-        readings=ArrayReadings(
-            presses.places[0],
-            presses.places[1],
-            presses.load,
-            np.where(presses.keep, presses.u, np.nan),
-            fit.model.predicted(state) + missing[:, None],
-            state.drift @ presses.drift.T + missing[:, None],
-        ),
+        readings=_readings(fit, missing),
         kernel="own" if state.own.size else "common",
         line_y=first.line_offset,
         layout=scan.layout,
@@ -467,6 +464,19 @@ def _array(scan: Scan, prepared: Prepared, found: Sorted, fit: JointFit) -> Sens
         reading=prepared.reading,
         process=Process.of_now(input_scan=scan.source),
         **common_circumstances([scan]),
+    )
+
+
+def _readings(fit: JointFit, missing: FloatArray) -> ArrayReadings:
+    """Return what was read, and what the fit predicts."""
+    presses = fit.model.presses
+    return ArrayReadings(
+        presses.places[0],
+        presses.places[1],
+        presses.load,
+        np.where(presses.keep, presses.u, np.nan),
+        fit.model.predicted(fit.state) + missing[:, None],
+        fit.state.drift @ presses.drift.T + missing[:, None],
     )
 
 

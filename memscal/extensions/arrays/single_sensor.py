@@ -67,7 +67,6 @@ def single_sensor(array: ArrayData, name: str) -> ApparatusFunction:
     k = round_wavenumbers(resolved)
     at_k = np.array([np.interp(k, array.k, column) for column in (kernel, *of_kernel.T)])
     logarithms = np.vstack([of_a, rows[1] / sigma, of_a + (at_k[1:] / at_k[0]).T])
-    radii = 8 * array.film.thickness * np.linspace(0.0, 1.0, 321)
     # Without what other sensors alone fail.
     checks = [
         check
@@ -84,13 +83,7 @@ def single_sensor(array: ArrayData, name: str) -> ApparatusFunction:
         parameters=parameters,
         checks=tuple(checks),
         sensor=StressSensor(name=name),
-        reference=StressProfile(
-            r=radii,
-            sigma_zz=array.load * array.radial(reference, radii),
-            load=array.load,
-            film=array.film,
-            indenter=array.indenter,
-        ),
+        reference=_stress(array, reference),
         budget={
             quantity: {source: abs(float(u)) for source, u in _by_source(array, row).items()}
             for quantity, row in zip(parameters.names, rows, strict=False)
@@ -98,6 +91,15 @@ def single_sensor(array: ArrayData, name: str) -> ApparatusFunction:
         kernel_changes=kernel_changes,
         shared_effects=_by_source(array, logarithms),
         **{field: getattr(array, field) for field in _SAME},
+    )
+
+
+def _stress(array: ArrayData, reference: FloatArray) -> StressProfile:
+    """Return the stress of the calibration by its transform per newton."""
+    radii = 8 * array.film.thickness * np.linspace(0.0, 1.0, 321)
+    stress = array.load * array.radial(reference, radii)
+    return StressProfile(
+        r=radii, sigma_zz=stress, load=array.load, film=array.film, indenter=array.indenter
     )
 
 

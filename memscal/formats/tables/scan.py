@@ -191,13 +191,9 @@ def import_table(
         columns["repeat"] = _lines(columns, numbering, notes)
     holds = None
     if layout.holds:
-        holds = find_holds(
-            columns,
-            table.all_lines(),
-            reading,
-            depth=columns.pop("depth", None),
-            baseline=layout.baseline is not None,
-        )
+        deep = columns.pop("depth", None)
+        anew = layout.baseline is not None
+        holds = find_holds(columns, table.all_lines(), reading, depth=deep, baseline=anew)
         if presses is not None:
             hook("require_all_held")(holds, presses)
         notes += holds.notes
@@ -207,22 +203,26 @@ def import_table(
             columns["u_zz_errors"] = holds.u_errors
     of = wanted["u_zz"]
     ceiling = None if array else layout.ceiling
-    at_ceiling = _leave_out_clipped(columns, holds, ceiling, of, reading, notes)
+    clipped = _leave_out_clipped(columns, holds, ceiling, of, reading, notes)
     columns = _placed(columns, notes, (lambda _: "of holds") if holds else table.lines)
     columns = without_dead_rows(columns, notes)
     bare = replace(conditions, layout=None) if array else conditions
     scan = _scan_of(columns, notes, reading, bare, uncertainties, table, holds)
-    scan = replace(scan, at_ceiling=at_ceiling)
-    one: Scan = scan
+    scan = one = replace(scan, at_ceiling=clipped)
     if array:
         scan, one = hook("array_scan")(scan, conditions.layout, layout.ceiling, of)
     del columns  # the scan has copies, and ten million rows are many
     warn_of_readings(scan)
+    _require_sizes(one)
+    return scan
+
+
+def _require_sizes(scan: Scan) -> None:
+    """Refuse lengths that no set-up has."""
     if scan.film is not None:
         require_film = require_plausible if isinstance(scan.indenter, Rod) else require_span
-        require_film(one)
+        require_film(scan)
     require_depth(scan)
-    return scan
 
 
 def _listed(column: Column | Sequence[Column] | None) -> list[Column]:
