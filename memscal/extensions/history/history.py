@@ -1,8 +1,11 @@
 """The history of a sensor from the artifacts of its calibrations."""
 
+from __future__ import annotations
+
 from bisect import bisect
 from collections.abc import Hashable, Iterator, Sequence
 from datetime import UTC, datetime, timedelta
+from os import PathLike
 
 import numpy as np
 
@@ -16,7 +19,6 @@ from memscal.extensions.history.changes import (
     exceeded_after,
     fitted,
 )
-from memscal.formats.files import FilePath
 from memscal.formats.opened import require_different
 from memscal.model.apparatus import ParameterSet
 from memscal.model.arrays import (
@@ -147,7 +149,7 @@ class History(FrozenArrays, Shown):
 
 
 def history(
-    apparatuses: Sequence[FilePath | ApparatusFunction],
+    apparatuses: Sequence[str | PathLike[str] | ApparatusFunction],
     *,
     tolerance: float = 0.02,
     repairs: Sequence[str] = (),
@@ -270,7 +272,7 @@ def history(
     )
 
 
-def _read(given: FilePath | ApparatusFunction) -> ApparatusFunction:
+def _read(given: str | PathLike[str] | ApparatusFunction) -> ApparatusFunction:
     """Return an artifact that has a start time."""
     apparatus = given if isinstance(given, ApparatusFunction) else load_apparatus(given)
     if not apparatus.start_time:
