@@ -9,9 +9,15 @@ import numpy as np
 from memscal.axisymmetry.kernels import RadialKernel
 from memscal.errors import InputError
 from memscal.extensions.simulation.disturbances import TYPICAL, Disturbances, Shear
-from memscal.extensions.simulation.sensor import blurred_stress, simulated_scan, simulated_sensor
+from memscal.extensions.simulation.sensor import (
+    SimulatedSensor,
+    blurred_stress,
+    simulated_scan,
+    simulated_sensor,
+)
 from memscal.extensions.simulation.sensor_array import MISPLACED, simulated_array
 from memscal.friction.family import require_loads
+from memscal.mechanics.contact import Contact
 from memscal.mechanics.press_rod import press_rod
 from memscal.model.arrays import (
     Arrays,
@@ -160,20 +166,10 @@ def simulate(
 
     x = np.linspace(-half_range, half_range, points)
 
-    def seen(centre: Sequence[float]) -> Arrays:
-        offset = x - centre[0]
-        across = (x if raster else np.zeros(1)) - centre[1]
-        distance = np.hypot.outer(across, offset)
-
-        def blurred(kernel: RadialKernel, order: int) -> FloatArray:
-            stress = blurred_stress(contacts, kernel, distance, order=order)
-            stress = stress * (loads / solved)[:, None, None]
-            return stress[0] if raster else np.repeat(stress[:, 0], repeats, axis=0)
-
-        return sensor.stresses(blurred, offset, distance)
-
+    y = x if raster else np.zeros(1)
+    factor = (loads / solved)[:, None, None]
     centres = several.centres if several else [disturbances.centre]
-    every = [seen(centre) for centre in centres]
+    every = [_stresses(sensor, contacts, factor, x, y, repeats, centre) for centre in centres]
     stresses = every[0]
     if several:
         stresses = {n: several.read(np.stack([each[n] for each in every])) for n in stresses}
@@ -182,14 +178,7 @@ def simulate(
     row = stress.shape[-2:] if raster or row_loads.size > 1 else x.shape
     shape = (*stress.shape[:-2], *row)
     states_law = disturbances.state_law
-    truth: dict[str, float | str | None] = {
-        "centre": disturbances.centre[0],
-        "centre_y": disturbances.centre[1],
-        "film_law": film.law,
-        "poisson_ratio": true.poisson_ratio,
-        "mooney_rivlin_ratio": film.mooney_rivlin_ratio,
-        "rod_friction": rod_friction,
-    }
+    truth = _truth(disturbances.centre, film, rod_friction)
     stated: Values = {}
     if several:
         truth |= several.truth(conversion_constant)
@@ -205,7 +194,7 @@ def simulate(
         x=x,
         loads=loads,
         truth={name: value for name, value in truth.items() if value is not None},
-        y=x if raster else None,
+        y=y if raster else None,
         normal_load=np.broadcast_to(row_loads[:, None], row) if loads.size > 1 else None,
         indenter=rod,
         rod_friction=rod_friction if states_law else None,
@@ -213,6 +202,40 @@ def simulate(
         title="Synthetic rod scan",
         **stated,
     )
+
+
+def _stresses(
+    sensor: SimulatedSensor,
+    contacts: Sequence[Contact],
+    factor: FloatArray,
+    x: FloatArray,
+    y: FloatArray,
+    repeats: int,
+    centre: Sequence[float],
+) -> Arrays:
+    """Return what a sensor with a centre sees on a raster, or on repeats of a line."""
+    offset = x - centre[0]
+    distance = np.hypot.outer(y - centre[1], offset)
+
+    def blurred(kernel: RadialKernel, order: int) -> FloatArray:
+        stress = factor * blurred_stress(contacts, kernel, distance, order=order)
+        return stress[0] if y.size > 1 else np.repeat(stress[:, 0], repeats, axis=0)
+
+    return sensor.stresses(blurred, offset, distance)
+
+
+def _truth(
+    centre: tuple[float, float], film: ElasticFilm, rod_friction: float | None
+) -> dict[str, float | str | None]:
+    """Return what a scan was made with, as its truth states it."""
+    return {
+        "centre": centre[0],
+        "centre_y": centre[1],
+        "film_law": film.law,
+        "poisson_ratio": film.expected.poisson_ratio,
+        "mooney_rivlin_ratio": film.mooney_rivlin_ratio,
+        "rod_friction": rod_friction,
+    }
 
 
 def without_law(film: ElasticFilm) -> ElasticFilm:
