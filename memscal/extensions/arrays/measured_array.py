@@ -1,6 +1,6 @@
 """An array of sensors whose fields are measured: ``calibrate_array(scan, kernel="measured")``."""
 
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -53,9 +53,6 @@ def measured_array(scan: Scan) -> SensorArray:
     predicted = floats(maps)
     top = np.abs(predicted).argmax(axis=1)
     unknown = np.full(n, np.nan)
-    # No film and no rod, where the scan states none.
-    film: Any = scan.film
-    indenter: Any = scan.indenter
     root = np.zeros((3 * n, 1))
     root[:n, 0] = errors
     nothing = np.zeros_like(predicted)
@@ -74,8 +71,9 @@ def measured_array(scan: Scan) -> SensorArray:
         modes=KernelModes(np.zeros((0, 4)), np.zeros(0, np.intp)),
         root=root,
         effects={},
-        film=film,
-        indenter=indenter,
+        # None, where the scan states none.
+        film=cast(Any, scan.film),
+        indenter=cast(Any, scan.indenter),
         load=1.0,
         readings=ArrayReadings(at_x, at_y, np.ones(at_x.size), mean, predicted, nothing),
         kernel="measured",

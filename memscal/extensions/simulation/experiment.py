@@ -213,14 +213,9 @@ def simulate_experiment(
     truth = {"conversion_constant": conversion_constant, "gain": gain, "seed": float(seed)}
     if shear is not None:
         truth["conversion_constant_xz"] = shear[1]
-    rod_truth = {
-        **described_film(true.film),
-        "indenter_radius": true.rod.radius,
-        "load_scale": true.rod_load_scale,
-        "load_1": true.rod_load_scale * rod_load,
-        **truth,
-        "gain": 1.0,
-    }
+    scale = true.rod_load_scale
+    of_rod = {"indenter_radius": true.rod.radius, "load_scale": scale, "load_1": scale * rod_load}
+    rod_truth = {**described_film(true.film), **of_rod, **truth, "gain": 1.0}
     u = disturbances.load_uncertainty
     nominal = replace(calibration, load=rod_load, load_uncertainty=u and u * rod_load)
     cell = LoadCell(name="a simulated load cell" if disturbances.one_load_cell else "")

@@ -15,14 +15,13 @@ from memscal.extensions.simulation.sensor import (
     simulated_scan,
     simulated_sensor,
 )
-from memscal.extensions.simulation.sensor_array import MISPLACED, simulated_array
+from memscal.extensions.simulation.sensor_array import simulated_array
 from memscal.friction.family import require_loads
 from memscal.mechanics.contact import Contact
 from memscal.mechanics.press_rod import press_rod
 from memscal.model.arrays import (
     Arrays,
     FloatArray,
-    Values,
     require_non_negative,
     require_range,
 )
@@ -161,11 +160,9 @@ def simulate(
         rod_friction = math.inf
     # The stress in a linear film is proportional to the load: one contact serves for all.
     solved = loads.max(keepdims=True) if linear else loads
-    true = film.expected
-    contacts = [press_rod(true, rod, value, rod_friction) for value in solved]
+    contacts = [press_rod(film.expected, rod, value, rod_friction) for value in solved]
 
     x = np.linspace(-half_range, half_range, points)
-
     y = x if raster else np.zeros(1)
     factor = (loads / solved)[:, None, None]
     centres = several.centres if several else [disturbances.centre]
@@ -179,11 +176,8 @@ def simulate(
     shape = (*stress.shape[:-2], *row)
     states_law = disturbances.state_law
     truth = _truth(disturbances.centre, film, rod_friction)
-    stated: Values = {}
     if several:
         truth |= several.truth(conversion_constant)
-        stated = {"sensors": several.sensors, "layout": several.layout}
-        stated["layout_uncertainty"] = MISPLACED
     return simulated_scan(
         sensor,
         stresses,
@@ -200,7 +194,7 @@ def simulate(
         rod_friction=rod_friction if states_law else None,
         film=film if states_law else without_law(film),
         title="Synthetic rod scan",
-        **stated,
+        **(several.stated if several else {}),
     )
 
 

@@ -5,6 +5,7 @@ import numpy as np
 from memscal.extensions.simulation.sensor import Truth
 from memscal.model.arrays import (
     FloatArray,
+    Values,
     array_record,
     require_positive,
     require_range,
@@ -34,6 +35,12 @@ class SimulatedArray:
     def sensors(self) -> tuple[str, ...]:
         """Their names: row by row, T01, T02 and so on."""
         return tuple(f"T{number:02d}" for number in range(1, len(self.layout) + 1))
+
+    @property
+    def stated(self) -> Values:
+        """What a scan states of them."""
+        layout = self.layout
+        return {"sensors": self.sensors, "layout": layout, "layout_uncertainty": MISPLACED}
 
     def read(self, stresses: FloatArray) -> FloatArray:
         """Return what sensors read of their stresses, (n, ...), over the nominal constant."""
