@@ -95,7 +95,7 @@ class SensorArray(ArrayData, Shown, Gridded):
 
         The readings are explained by :math:`u_i = P \sum_j C_{ij} A_j [f_j + q \cdot s_j](r)`
         with the stress of the indenter and of its shear at the base of the film, blurred by G
-        (:mod:`~memscal.extensions.arrays.receptive_fields`), in noise as in the scan.  Shear
+        in noise as in the scan.  Shear
         moves the readings as another place does, by a third of h Q/P: unless it is known, state
         how large it may be.
 
@@ -209,10 +209,10 @@ class SensorArray(ArrayData, Shown, Gridded):
         """Return a stream: frames are pushed into it, and it says what presses, drift or not.
 
         Baselines are tracked by a Kalman filter in blocks of 0.2 s, in which a contact is a diffuse
-        nuisance (:mod:`memscal.extensions.arrays.stream`): drift is common to the sensors, a
+        nuisance: drift is common to the sensors, a
         contact is local, and stays however long it lasts.  What presses in the first block is
         taken for the baseline.  A sensor that is dead, has not changed for 1 s, or that alone
-        contradicts all others for most of a second, is left out (:attr:`Stream.left_out`); one
+        contradicts all others for most of a second, is left out (``left_out``); one
         that was stuck returns when it changes.  Contacts are assumed to be without shear: one of
         Q over P moves the place by about 0.35 h Q/P, h being the film's thickness.
 
