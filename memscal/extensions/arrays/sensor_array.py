@@ -94,10 +94,9 @@ class SensorArray(ArrayData, Shown, Gridded):
         r"""Find place and force of a contact in each frame.
 
         The readings are explained by :math:`u_i = P \sum_j C_{ij} A_j [f_j + q \cdot s_j](r)`
-        with the stress of the indenter and of its shear at the base of the film, blurred by G
-        in noise as in the scan.  Shear
-        moves the readings as another place does, by a third of h Q/P: unless it is known, state
-        how large it may be.
+        with the stress of the indenter and of its shear at the base of the film, blurred by G, in
+        noise as in the scan.  Shear moves the readings as another place does, by a third of h Q/P:
+        unless it is known, state how large it may be.
 
         Parameters
         ----------
