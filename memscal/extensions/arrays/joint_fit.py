@@ -30,7 +30,14 @@ from memscal.estimation.departures import ReducedScan, departure_basis
 from memscal.estimation.forward import ForwardModel
 from memscal.estimation.gaussian import GaussianFit
 from memscal.estimation.voltage_map import VoltageMap, square_root
-from memscal.extensions.arrays.joint_model import ArrayState, Information, JointModel, Layout, Noise
+from memscal.extensions.arrays.joint_model import (
+    ArrayState,
+    Information,
+    JointModel,
+    Layout,
+    Noise,
+    taken,
+)
 from memscal.extensions.arrays.presses import Waves
 from memscal.model.arrays import FloatArray, array_record
 
@@ -40,10 +47,11 @@ WIDEST = SPREADS[-1]
 #: Standard deviation of what is a sensor's own: ln width, and departures over the Gaussian's size.
 OWN_WIDTH = 0.05
 _OWN_SHAPE = 0.05
+#: Rounds of a fit, and of the first one, after which the noise is known.
+_MOST_ROUNDS = 12
 _FIRST_ROUNDS = 3
 #: Points of a mean along the scan.
 _NODES = 8
-_MOST_ROUNDS = 12
 #: A sensor's own noise is at least this share of its variance, and of its largest reading.
 _LEAST_OWN = 0.02
 _ROUNDING = 1e-7
@@ -66,7 +74,7 @@ class ReducedArray(ReducedScan):
         """Derivatives by the reduced data: what is each sensor's own is integrated out."""
         return VoltageMap(((gain, np.eye(gain.shape[1])),))
 
-    def residual(self, basis: Any, mean: FloatArray) -> FloatArray:  # noqa: ARG002
+    def residual(self, basis: Any, mean: FloatArray) -> FloatArray:  # noqa: ARG002 - as of a scan
         """Nothing: the residuals are those of the array."""
         return np.zeros(0)
 
@@ -230,8 +238,8 @@ def fit_shape(
         ]
         likeliest = max(weighed, key=attrgetter("log_evidence"))
         best = likeliest.posterior()
-        longest = abs(best.change[model.layout.centres]).max() / gaussian.width
-        share = min(1.0, _LONGEST / longest)
+        longest = abs(taken(best.change, model.layout.centres)).max() / gaussian.width
+        share = _LONGEST / max(longest, _LONGEST)
         moved = model.layout.moved(state, share * best.change, presses.axes)
         state = replace(moved, kernel=model.waves.mix @ best.kernel)
         size = np.sqrt(np.sum(best.root[: model.layout.count] ** 2, axis=1))

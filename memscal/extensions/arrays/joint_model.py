@@ -119,7 +119,7 @@ class Information:
         return slice(1, 1 + self.count)
 
     @property
-    def others(self) -> FloatArray:
+    def others(self) -> IndexArray:
         """Places of the residuals and of the kernels."""
         return np.delete(np.arange(len(self.gram)), self.parameters)
 
