@@ -329,6 +329,7 @@ def _zero(array: ArrayData, rest: ArrayLike | None) -> ArrayPair:
     zero = frames.mean(axis=0).filled(np.nan)
     if len(frames) == 1:
         return zero, array.noise
+    # Masked arrays of numpy have no types.
     scatter: Any = np.ma.cov(frames, rowvar=False)  # type: ignore[no-untyped-call]
     return zero, scatter.filled(0.0) / len(frames)
 
