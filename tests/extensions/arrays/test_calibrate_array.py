@@ -134,7 +134,7 @@ def test_a_line_along_y_tells_no_x():
 def refused_scans():
     scan = simulated_scan(1, 3, seed=1)[0]
     yield "single", scan.of_sensor(0), {}, InputError, "single sensor"
-    yield "kernel", scan, {"kernel": "comon"}, MemscalError, "common"
+    yield "kernel", scan, {"kernel": "shared"}, MemscalError, "common"
     yield "crosstalk", scan, {"crosstalk": "nearst"}, MemscalError, "nearest"
     yield "pair", scan, {"crosstalk": [("T00", "T1")]}, MemscalError, "T01"
     yield "silent", replace(scan, u_zz=0 * scan.u_zz), {}, FitError, "3 sensors"
