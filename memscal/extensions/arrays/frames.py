@@ -10,7 +10,7 @@ from memscal.formats.tables.sheets import open_table
 from memscal.model.arrays import FloatArray, Values
 from memscal.model.quantities import dimension_in
 
-#: Columns that are no readings.
+#: Columns that are no readings, where no sensor has their name.
 _CARRIED = ("frame", "t")
 
 
@@ -22,10 +22,11 @@ def read_frames(
     Its columns may be in any order; those of another array are refused.
     """
     table = open_table(path)
+    carries = [name for name in _CARRIED if name in table.heads and name not in array.sensors]
     lacking = [name for name in array.sensors if name not in table.heads]
-    others = [name for name in table.heads if name not in (*array.sensors, *_CARRIED)]
+    others = [name for name in table.heads if name not in (*array.sensors, *carries)]
     if lacking or others:
-        count = len({*table.heads} - {*_CARRIED})
+        count = len({*table.heads} - {*carries})
         raise FormatError(
             f"{path} has {count} columns of readings, but the array has {len(array.sensors)} "
             f"sensors. Without a column: {', '.join(lacking) or 'none'}. Columns of no sensor: "
@@ -39,9 +40,9 @@ def read_frames(
     for name in array.sensors:
         unit = table.unit_of(name, u_unit, "u_unit (--u-unit)")
         wanted[name] = Wanted(name, unit, of_u)
-    if "frame" in table.heads:
+    if "frame" in carries:
         wanted["frame"] = Wanted("frame")
-    if "t" in table.heads:
+    if "t" in carries:
         wanted["time"] = Wanted("t", table.unit_of("t", None, "t", "s"), "time")
     carried: Values = {**table.columns(wanted)}
     u = np.column_stack([carried.pop(name) for name in array.sensors])
