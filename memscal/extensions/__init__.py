@@ -66,10 +66,7 @@ VIEWS = {
         "extensions.arrays.summary",
         "extensions.arrays.figure.array_figure",
     ),
-    "Contacts": (
-        "extensions.arrays.contacts_summary",
-        "extensions.arrays.contacts_figure.contacts_figure",
-    ),
+    "Contacts": ("extensions.arrays.contacts_summary", ""),
     "SensorArray": ("extensions.arrays.summary", "extensions.arrays.figure.array_figure"),
     "Design": ("extensions.planning.summary", "extensions.planning.figure.design_figure"),
     "History": ("extensions.history.summary", "extensions.history.figure.history_figure"),

@@ -11,7 +11,6 @@ from memscal.cli.options import (
     FILE,
     NonNegative,
     Quantity,
-    figure_option,
     indenter_from,
     option,
     out_option,
@@ -23,7 +22,7 @@ EXAMPLES = """\b
 Examples:
   memscal locate array.h5 frames.csv -o contacts.csv
   memscal locate array.h5 frames.csv --indenter rod:0.25 --shear 0 -o contacts.csv
-  memscal locate array.h5 frames.csv --indenter sphere:5 --rest rest.csv --figure contacts.png
+  memscal locate array.h5 frames.csv --indenter sphere:5 --rest rest.csv
 """
 
 
@@ -49,9 +48,7 @@ def _indenter(ctx: click.Context, param: click.Parameter, text: str) -> Any:
 @option("--rest", FILE, metavar="rest.csv")(
     "Frames without contact, whose mean is subtracted; without them frames are tared."
 )
-@option("--u-unit", "UNIT")("Unit of the readings where the heads of the table state none.")
 @out_option("Table to write (.csv): place and force of each frame, with uncertainties and flags.")
-@figure_option("Draw places and forces.")
 @output_options
 def command(
     array: Path, frames: Path, rest: Path | None, output: Path | None, **options: Any
@@ -62,21 +59,18 @@ def command(
     its unit: "T00 [mV]". A column "frame" or "t" is carried over. An empty cell is a missing
     reading. One contact is sought in each frame.
     """
-    figures = options["figures"]
-    out.prove_writable([output, *figures], force=options["force"], inputs=[array, frames, rest])
+    out.prove_writable([output], force=options["force"], inputs=[array, frames, rest])
     from memscal.extensions.arrays.contacts_summary import csv_text
     from memscal.extensions.arrays.frames import read_frames
     from memscal.extensions.arrays.sensor_array import load_array
 
     held = load_array(array)
-    u, carried = read_frames(held, frames, options["u_unit"])
-    zero = None if rest is None else read_frames(held, rest, options["u_unit"])[0]
+    u, carried = read_frames(held, frames)
+    zero = None if rest is None else read_frames(held, rest)[0]
     with out.working("Locating"):
         contacts = held.locate(u, options["indenter"], options["shear"], zero)
     contacts = replace(contacts, **carried)
-    files = out.drawn(contacts, figures)
-    if output is not None:
-        files[output] = csv_text(contacts).encode("utf-8")
+    files = {} if output is None else {output: csv_text(contacts).encode("utf-8")}
     with together():
         out.write_files(files, force=options["force"])
         head = {"contacts": output and str(output)}

@@ -7,11 +7,11 @@ import numpy as np
 from memscal.model.arrays import FloatArray, FrozenArrays, IndexArray, keyword_array_record
 from memscal.model.indenter import RoundIndenter
 from memscal.model.quantities import MM
-from memscal.model.result import Shown, Tabulated
+from memscal.model.result import Told
 
 
 @keyword_array_record
-class Contacts(FrozenArrays, Shown, Tabulated):
+class Contacts(FrozenArrays, Told):
     """Where contacts press on an array, and how strongly, as :meth:`SensorArray.locate` finds them.
 
     Attributes
@@ -42,8 +42,6 @@ class Contacts(FrozenArrays, Shown, Tabulated):
         Number of each frame.
     time : ndarray, shape (frames,), or None
         Time of each frame, in s.
-    centres : ndarray, shape (sensors, 2)
-        Places of the sensors that were used, in m.
     unit : str
         Unit of the forces: ``N``, or ``1`` of presses.
 
@@ -66,7 +64,6 @@ class Contacts(FrozenArrays, Shown, Tabulated):
     assumed_shear: float
     indenter: RoundIndenter | None
     frame: IndexArray | FloatArray
-    centres: FloatArray
     time: FloatArray | None = None
     unit: str = "N"
 

@@ -1,4 +1,4 @@
-"""Contacts as an answer, tables, a mapping, a data frame, and the text of contacts.csv."""
+"""Contacts as an answer, tables, a mapping, and the text of contacts.csv."""
 
 import csv
 import io
@@ -9,7 +9,7 @@ from memscal.errors import counted
 from memscal.extensions.arrays.contacts import Contacts
 from memscal.model.arrays import Values
 from memscal.model.quantities import MM, Quantity, measured
-from memscal.summaries import declared
+from memscal.summaries.declared import members
 from memscal.summaries.table import Table, percent
 
 #: Of more frames the first are printed, with so many columns; digits of numbers there and in files.
@@ -72,13 +72,8 @@ def mapping(contacts: Contacts) -> Values:
         "schema_version": "1",
         "indenter": contacts.pressed_by,
         "assumed_shear": contacts.assumed_shear,
-        **declared.members(_quantities(contacts), None, **_values(contacts)),
+        **members(_quantities(contacts), None, **_values(contacts)),
     }
-
-
-def frame(contacts: Contacts) -> declared.DataFrame:
-    """Return one row for each frame."""
-    return declared.data_frame(_quantities(contacts), _values(contacts))
 
 
 def csv_text(contacts: Contacts) -> str:

@@ -14,9 +14,7 @@ from memscal.model.quantities import dimension_in
 _CARRIED = ("frame", "t")
 
 
-def read_frames(
-    array: ArrayData, path: FilePath, u_unit: str | None = None
-) -> tuple[FloatArray, Values]:
+def read_frames(array: ArrayData, path: FilePath) -> tuple[FloatArray, Values]:
     """Return readings (frames, sensors), and ``frame`` and ``time`` where they stand in a table.
 
     Its columns may be in any order; those of another array are refused.
@@ -36,10 +34,9 @@ def read_frames(
             "empty where it did not read; beside them only 'frame' or 't'.",
         )
     of_u = dimension_in("voltage", array.reading)
-    wanted = {}
-    for name in array.sensors:
-        unit = table.unit_of(name, u_unit, "u_unit (--u-unit)")
-        wanted[name] = Wanted(name, unit, of_u)
+    wanted = {
+        name: Wanted(name, table.unit_of(name, None, "u_A [mV]"), of_u) for name in array.sensors
+    }
     if "frame" in carries:
         wanted["frame"] = Wanted("frame")
     if "t" in carries:

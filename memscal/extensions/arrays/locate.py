@@ -303,7 +303,6 @@ def locate(
         assumed_shear=float(seeking.shear),
         indenter=None if isinstance(indenter, str) else indenter,
         frame=np.arange(len(values)),
-        centres=fields.centres,
         unit=fields.unit,
     )
 
