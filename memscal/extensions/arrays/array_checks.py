@@ -211,7 +211,7 @@ def _common_kernel(own: JointFit) -> Failing:
     """Test whether widths differ, where the common shape is free."""
     used = np.flatnonzero(own.model.presses.used)
     places = own.model.layout.own[used, 0]
-    gram = own.information.gram
+    gram = own.information
     scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
     scaled = gram / np.outer(scale, scale)
     widths = 1 + places

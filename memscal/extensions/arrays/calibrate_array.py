@@ -326,15 +326,8 @@ def _begun(
     )
     forward = ForwardModel(points, references)
     alone = fit_gaussian_to_points(forward, np.ones_like(points.u))
-    bare = replace(points, curvature=np.zeros(1))
-    gaussian = replace(
-        alone,
-        points=bare,
-        jacobian=np.zeros((0, 2)),
-        drift=np.zeros(0),
-        predicted=np.zeros(0),
-        geometry=forward.geometry(alone.centre),
-    )
+    straight = replace(points, curvature=np.zeros(1))
+    gaussian = replace(alone, points=straight, jacobian=alone.jacobian[:, :2])
     used = found.used
     high = np.maximum(presses.u - found.baseline[:, None], 0.0) * presses.keep
     high[high < _HIGH * found.peak[:, None]] = 0.0

@@ -14,10 +14,8 @@ ring of the common G.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from operator import attrgetter
-from typing import Any
 
 import numpy as np
 
@@ -29,17 +27,16 @@ from memscal.estimation.bayesian import Weighing
 from memscal.estimation.departures import ReducedScan, departure_basis
 from memscal.estimation.forward import ForwardModel
 from memscal.estimation.gaussian import GaussianFit
-from memscal.estimation.voltage_map import VoltageMap, square_root
+from memscal.estimation.voltage_map import square_root
 from memscal.extensions.arrays.joint_model import (
     ArrayState,
-    Information,
     JointModel,
     Layout,
     Noise,
     taken,
 )
 from memscal.extensions.arrays.presses import Waves
-from memscal.model.arrays import FloatArray, array_record
+from memscal.model.arrays import FloatArray, array_record, floats
 
 #: Standard deviations of crosstalk about its mean that are weighed, and that of the mean.
 SPREADS = (0.0005, 0.001, 0.002, 0.005, 0.01, 0.02, 0.05)
@@ -62,24 +59,6 @@ _LONGEST = 0.5
 
 
 @array_record
-class ReducedArray(ReducedScan):
-    """Data and kernels of an array, of which all else is integrated out."""
-
-    def signal(self, kernels: FloatArray) -> FloatArray:
-        """Voltages (r, m) of round kernels by their transforms, (nodes, m)."""
-        assert self.synthesis is not None
-        return self.synthesis @ kernels
-
-    def by_voltages(self, gain: FloatArray) -> VoltageMap:
-        """Derivatives by the reduced data: what is each sensor's own is integrated out."""
-        return VoltageMap(((gain, np.eye(gain.shape[1])),))
-
-    def residual(self, basis: Any, mean: FloatArray) -> FloatArray:  # noqa: ARG002 - as of a scan
-        """Nothing: the residuals are those of the array."""
-        return np.zeros(0)
-
-
-@array_record
 class Posterior:
     """What the readings tell of parameters and common kernel, by a prior of the crosstalk."""
 
@@ -96,7 +75,7 @@ class JointFit:
     model: JointModel
     state: ArrayState
     noise: Noise
-    information: Information
+    information: FloatArray  # (1 + p + f, 1 + p + f): of the last step
     gaussian: GaussianFit
     posterior: Posterior
     widest: Posterior  # by the widest prior of the crosstalk
@@ -143,28 +122,19 @@ def parameters_of(layout: Layout, state: ArrayState) -> FloatArray:
     return values
 
 
-@array_record
-class Solved:
-    """Normal equations of the parameters, solved."""
-
-    root: FloatArray  # (p, p): of the inverse, which is the covariance
-    log_determinant: float
-
-    @classmethod
-    def of(cls, matrix: FloatArray) -> Solved:
-        """Invert normal equations, scaled to a diagonal of ones; refuse those of no solution."""
-        with np.errstate(divide="ignore"):
-            scale = np.diag(matrix) ** -0.5
-        try:
-            inverse = np.linalg.inv(matrix * np.outer(scale, scale))
-            root = scale[:, None] * np.linalg.cholesky(inverse)
-        except np.linalg.LinAlgError:
-            raise FitError(
-                "The scan does not determine the array: a sensor has too few readings about its "
-                "centre.",
-                cure="Scan past every sensor, or leave the sensor out (used).",
-            ) from None
-        return cls(root, float(-2 * np.log(np.diag(root)).sum()))
+def inverse_root(matrix: FloatArray) -> FloatArray:
+    """Return the root of the inverse of normal equations; refuse those of no solution."""
+    with np.errstate(divide="ignore"):
+        scale = np.diag(matrix) ** -0.5
+    try:
+        inverse = np.linalg.inv(matrix * np.outer(scale, scale))
+        return floats(scale[:, None] * np.linalg.cholesky(inverse))
+    except np.linalg.LinAlgError:
+        raise FitError(
+            "The scan does not determine the array: a sensor has too few readings about its "
+            "centre.",
+            cure="Scan past every sensor, or leave the sensor out (used).",
+        ) from None
 
 
 def noise_of(model: JointModel, state: ArrayState) -> Noise:
@@ -228,13 +198,13 @@ def fit_shape(
     """Fit an array by damped Gauss-Newton steps, each with the shapes of G weighed anew."""
     presses = model.presses
     everything = np.eye(len(model.waves.mix))
+    spreads = SPREADS if model.layout.crosstalk.max() >= 0 else [WIDEST]
     for _ in range(rounds):
         about = replace(state, kernel=model.waves.mix @ _gaussian(gaussian))
         data = presses.u - model.predicted(about)
         information = model.information(state, noise, everything, data)
         weighed = [
-            weighed_by(model, information, state, gaussian, forward, spread)
-            for spread in _spreads(model.layout)
+            weighed_by(model, information, state, gaussian, forward, spread) for spread in spreads
         ]
         likeliest = max(weighed, key=attrgetter("log_evidence"))
         best = likeliest.posterior()
@@ -246,13 +216,8 @@ def fit_shape(
         if np.all(abs(best.change) < _SETTLED * size):
             break
     widest = weighed[-1].posterior()
-    evidence = likeliest.log_evidence
-    steps = (model, state, noise, information, gaussian, best, widest)
-    return JointFit(*steps, forward, evidence)
-
-
-def _spreads(layout: Layout) -> Sequence[float]:
-    return SPREADS if layout.crosstalk.max() >= 0 else SPREADS[-1:]
+    fitted = (model, state, noise, information, gaussian, best, widest, forward)
+    return JointFit(*fitted, likeliest.log_evidence)
 
 
 def _gaussian(gaussian: GaussianFit) -> FloatArray:
@@ -265,7 +230,7 @@ class Weighed:
     """Shapes of the common G, weighed where what is each sensor's own is integrated out."""
 
     log_evidence: float
-    solved: Solved
+    root: FloatArray  # (p, p): of the covariance of the parameters
     by_others: FloatArray  # (p, 1 + f): the parameters by data and kernels
     columns: FloatArray  # (r, 1 + f): data and kernels that are left
     mix: FloatArray
@@ -281,9 +246,8 @@ class Weighed:
         by_kernel = self.by_others[:, 1:] @ (self.mix @ kernels)
         of_kernel = square_root(weighed.covariance, np.diag(weighed.covariance))
         count = len(by_kernel)
-        of_own = self.solved.root
         none = np.zeros((len(kernels), count))
-        root = np.block([[of_own, -by_kernel @ of_kernel], [none, kernels @ of_kernel]])
+        root = np.block([[self.root, -by_kernel @ of_kernel], [none, kernels @ of_kernel]])
         kernel_gain = weighed.gain.dense() @ self.columns[:, 1:]
         own_gain = self.by_others[:, 1:] - by_kernel @ kernel_gain
         return Posterior(
@@ -296,7 +260,7 @@ class Weighed:
 
 def weighed_by(
     model: JointModel,
-    information: Information,
+    information: FloatArray,
     state: ArrayState,
     gaussian: GaussianFit,
     forward: ForwardModel,
@@ -305,37 +269,32 @@ def weighed_by(
     """Integrate out what is each sensor's own by a prior, and weigh the shapes of the common G."""
     precision = prior_precision(model.layout, spread)
     values = parameters_of(model.layout, state)
-    gram = information.gram.copy()
-    own = information.parameters
+    gram = information.copy()
+    own = slice(1, 1 + model.layout.count)
     gram[own, own] += precision
     gram[own, 0] -= precision @ values
     gram[0, own] = gram[own, 0]
     gram[0, 0] += values @ precision @ values
-    solved = Solved.of(gram[own, own])
-    others = information.others
-    by_others = solved.root @ (solved.root.T @ gram[own][:, others])
-    columns = _root_of(gram[np.ix_(others, others)] - gram[own][:, others].T @ by_others)
+    root = inverse_root(gram[own, own])
+    others = np.delete(np.arange(len(gram)), own)
+    by_others = root @ (root.T @ gram[own][:, others])
+    left = gram[np.ix_(others, others)] - gram[own][:, others].T @ by_others
+    columns = square_root(left).T
     reduced = _reduced(columns, model.waves, gaussian, forward)
     basis = departure_basis(gaussian, reduced)
-    count = information.readings - model.layout.count
+    count = model.presses.keep.sum() - model.layout.count
     weighing = bayesian.weigh_departures(reduced, basis, count, least_noise=1.0)
     stated = np.diag(precision) > 0
-    volume = np.linalg.slogdet(precision[np.ix_(stated, stated)])[1] - solved.log_determinant
-    evidence = float(weighing.evidence + 0.5 * volume)
-    return Weighed(evidence, solved, by_others, columns, model.waves.mix, weighing)
-
-
-def _root_of(gram: FloatArray) -> FloatArray:
-    """Return columns whose products these are."""
-    scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
-    values, vectors = np.linalg.eigh(gram / np.outer(scale, scale))
-    root: FloatArray = np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T * scale
-    return root
+    volume = (
+        np.linalg.slogdet(precision[np.ix_(stated, stated)])[1] / 2 + np.log(np.diag(root)).sum()
+    )
+    evidence = float(weighing.evidence + volume)
+    return Weighed(evidence, root, by_others, columns, model.waves.mix, weighing)
 
 
 def _reduced(
     columns: FloatArray, waves: Waves, gaussian: GaussianFit, forward: ForwardModel
-) -> ReducedArray:
+) -> ReducedScan:
     """Return data and kernels in the place of a reduced scan, about a Gaussian."""
     synthesis = columns[:, 1:] @ waves.mix
     k = forward.k
@@ -343,4 +302,5 @@ def _reduced(
     flat = synthesis @ np.stack([gaussian_transfer(k, gaussian.sigma), slope], axis=1)
     none = np.zeros((len(columns), 0))
     weights = np.ones(len(columns))
-    return ReducedArray(forward, gaussian, columns[:, 0], flat, none, weights, synthesis, None)
+    same = np.eye(len(columns))
+    return ReducedScan(forward, gaussian, columns[:, 0], flat, none, weights, synthesis, same)

@@ -106,25 +106,6 @@ def taken(rows: FloatArray, numbers: IndexArray) -> FloatArray:
 
 
 @array_record
-class Information:
-    """Weighted sums of products of the residuals, of p parameters and of q kernels."""
-
-    gram: FloatArray  # (1 + p + q, 1 + p + q)
-    count: int  # p
-    readings: int
-
-    @property
-    def parameters(self) -> slice:
-        """Places of the parameters."""
-        return slice(1, 1 + self.count)
-
-    @property
-    def others(self) -> IndexArray:
-        """Places of the residuals and of the kernels."""
-        return np.delete(np.arange(len(self.gram)), self.parameters)
-
-
-@array_record
 class JointModel:
     """Readings of an array of which pairs have crosstalk, with own changes of the kernels."""
 
@@ -167,8 +148,11 @@ class JointModel:
 
     def information(
         self, state: ArrayState, noise: Noise, kernels: FloatArray, data: FloatArray
-    ) -> Information:
-        """Linearise about a state, with kernels (f, q) of all sensors, for residuals (m, t)."""
+    ) -> FloatArray:
+        """Linearise about a state, with kernels (f, q) of all sensors, for residuals (m, t).
+
+        Weighted sums of products of the residuals, of p parameters and of the kernels: one matrix.
+        """
         presses = self.presses
         layout = self.layout
         p = layout.count
@@ -212,7 +196,7 @@ class JointModel:
                 level[:, index] += (root * change[i])[:, None] * block
         if len(common):
             gram -= self._in_common(common, noise, shared)
-        return Information(gram, p, int(presses.keep.sum()))
+        return gram
 
     def by_press(self, state: ArrayState) -> FloatArray:
         """Derivatives of kept readings by the place along the scan and by ln load, (2, m, t)."""

@@ -75,7 +75,7 @@ def test_information_is_that_of_brute_force(axes):
     moved = replace(state, centres=state.centres - [1e-8, 0])
     by_place = (joint.predicted(moved) - joint.predicted(state)) / 1e-8
     signal = joint.predicted(state) - state.drift @ presses.drift.T
-    gram = np.zeros_like(found.gram)
+    gram = np.zeros_like(found)
     for t in range(presses.load.size):
         covariance = noise.covariance + np.outer(by_place[:, t], by_place[:, t]) * 10e-6**2
         covariance += np.outer(signal[:, t], signal[:, t]) * 0.01**2
@@ -83,7 +83,4 @@ def test_information_is_that_of_brute_force(axes):
         some = stacked[kept, t]
         gram += some.T @ np.linalg.inv(covariance[np.ix_(kept, kept)]) @ some
     scale = np.sqrt(np.diag(gram))
-    assert np.allclose(
-        found.gram / np.outer(scale, scale), gram / np.outer(scale, scale), atol=2e-5
-    )
-    assert found.readings == presses.keep.sum()
+    assert np.allclose(found / np.outer(scale, scale), gram / np.outer(scale, scale), atol=2e-5)
