@@ -9,13 +9,12 @@ from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 
-from memscal.axisymmetry.kernels import gaussian_transfer, gaussian_transfer_slope
 from memscal.calibration.prepare import Prepared, Reference, Request, prepare
 from memscal.deconvolution.division import WhiteNoise
 from memscal.errors import FitError, InputError, counted, require_names
 from memscal.estimation.departures import SHAPES
 from memscal.estimation.forward import ForwardModel
-from memscal.estimation.gaussian import GaussianFit, fit_gaussian_to_points
+from memscal.estimation.gaussian import fit_gaussian_to_points
 from memscal.estimation.points import MINIMUM_POSITIONS, measured_points
 from memscal.estimation.reference_spectra import (
     expected_spectra,
@@ -114,8 +113,6 @@ class _Begun(NamedTuple):
     model: JointModel
     state: ArrayState
     noise: Noise
-    gaussian: GaussianFit
-    forward: ForwardModel
 
 
 @single_threaded()
@@ -342,52 +339,47 @@ def _begun(
     largest = int(np.argmax(np.where(used, found.peak, 0.0)))
     waves = Waves.of(references[0], np.hypot(*np.ptp(presses.places, axis=1)))
     parameters = Layout.of(presses, pairs, largest, 0)
-    model = JointModel(presses, waves, parameters, np.zeros((forward.k.size, 0)))
+    none = np.zeros((forward.k.size, 0))
+    model = JointModel(presses, waves, parameters, none, gaussian, forward)
     n = used.size
     drift = np.zeros((n, presses.drift.shape[1]))
     drift[:, :: 1 + len(presses.axes)] = np.where(used, found.baseline, 0.0)[:, None]
-    transfer = gaussian_transfer(forward.k, alone.sigma)
     state = ArrayState(
         np.where(used, found.peak / found.peak[largest], 1.0),
         np.nan_to_num(centres),
         np.eye(n),
         drift,
-        alone.conversion_constant * waves.mix @ transfer,
+        alone.conversion_constant * waves.mix @ model.gaussian_kernels[:, 0],
         np.zeros((n, 0)),
     )
     deviation = np.where(used, _AT_FIRST * found.peak, 1.0)
     nothing = np.zeros((n, n))
-    return _Begun(model, state, Noise(deviation**2, nothing, nothing), gaussian, forward)
+    return _Begun(model, state, Noise(deviation**2, nothing, nothing))
 
 
 def _own_fit(fit: JointFit, *, shapes: bool) -> JointFit:
     """Fit a width of its own for each sensor, and with ``shapes`` departures from it, too."""
-    gaussian = fit.gaussian
-    k = fit.forward.k
-    kernels = [
-        gaussian.conversion_constant
-        * gaussian.sigma
-        * gaussian_transfer_slope(k, gaussian.sigma)[:, None]
-    ]
+    model = fit.model
+    gaussian = model.gaussian
+    kernels = [gaussian.sigma * model.gaussian_kernels[:, 1:]]
     if shapes:
         kernels += [
-            shape.rings(gaussian.width, gaussian.conversion_constant).transform(k)
+            shape.rings(gaussian.width, gaussian.conversion_constant).transform(model.forward.k)
             for shape in _OWN_SHAPES
         ]
     own = np.hstack(kernels)
-    model = fit.model
     largest = int(np.flatnonzero(model.presses.used & (model.layout.gains < 0))[0])
     layout = Layout.of(model.presses, model.layout.crosstalk >= 0, largest, own.shape[1])
     state = replace(fit.state, own=np.zeros((fit.state.gain.size, own.shape[1])))
     model = replace(model, layout=layout, own_kernels=own)
     rounds = _OWN_ROUNDS if shapes else 1
-    return fit_shape(model, state, fit.noise, gaussian, fit.forward, rounds)
+    return fit_shape(model, state, fit.noise, rounds)
 
 
 def _effects(prepared: Prepared, fit: JointFit) -> Arrays:
     """Return what one standard uncertainty of each stated input does to the posterior's columns."""
     scan = prepared.scans[0]
-    k = fit.forward.k
+    k = fit.model.forward.k
     kernel = fit.posterior.kernel
     changes = reference_sensitivities([scan], [fit.reference])
     products = {name: change[0] * kernel for name, change in changes.items()}
@@ -419,8 +411,8 @@ def _array(scan: Scan, prepared: Prepared, found: Sorted, fit: JointFit) -> Sens
     state = fit.state
     unknown = np.repeat(~used[:, None], 2, axis=1)
     unknown[:, [axis for axis in (0, 1) if axis not in presses.axes]] = True
-    k = fit.forward.k
-    widths = [nearest_width(k, kernel, fit.gaussian.sigma) for kernel in numbers.kernels]
+    k = fit.model.forward.k
+    widths = [nearest_width(k, kernel, fit.model.gaussian.sigma) for kernel in numbers.kernels]
     first = prepared.scans[0]
     rod = first.set_up.indenter
     assert isinstance(rod, Rod)

@@ -20,13 +20,10 @@ from operator import attrgetter
 import numpy as np
 
 from memscal.axisymmetry.hankel import RadialSpectrum
-from memscal.axisymmetry.kernels import gaussian_transfer, gaussian_transfer_slope
 from memscal.errors import FitError
 from memscal.estimation import bayesian
 from memscal.estimation.bayesian import Weighing
 from memscal.estimation.departures import ReducedScan, departure_basis
-from memscal.estimation.forward import ForwardModel
-from memscal.estimation.gaussian import GaussianFit
 from memscal.estimation.voltage_map import square_root
 from memscal.extensions.arrays.joint_model import (
     ArrayState,
@@ -35,7 +32,6 @@ from memscal.extensions.arrays.joint_model import (
     Noise,
     taken,
 )
-from memscal.extensions.arrays.presses import Waves
 from memscal.model.arrays import FloatArray, array_record, floats
 
 #: Standard deviations of crosstalk about its mean that are weighed, and that of the mean.
@@ -76,16 +72,14 @@ class JointFit:
     state: ArrayState
     noise: Noise
     information: FloatArray  # (1 + p + f, 1 + p + f): of the last step
-    gaussian: GaussianFit
     posterior: Posterior
     widest: Posterior  # by the widest prior of the crosstalk
-    forward: ForwardModel
     log_evidence: float
 
     @property
     def reference(self) -> RadialSpectrum:
         """Transform of the base stress per newton."""
-        return self.forward.reference
+        return self.model.forward.reference
 
     @property
     def by_widest(self) -> JointFit:
@@ -164,15 +158,12 @@ def noise_of(model: JointModel, state: ArrayState) -> Noise:
     return Noise(np.maximum(total - np.diag(common), least), common, of_presses)
 
 
-def fit_array(
-    model: JointModel, state: ArrayState, noise: Noise, gaussian: GaussianFit, forward: ForwardModel
-) -> JointFit:
+def fit_array(model: JointModel, state: ArrayState, noise: Noise) -> JointFit:
     """Fit an array from a start; the noise is that of the residuals."""
-    first = fit_shape(model, state, noise, gaussian, forward, _FIRST_ROUNDS)
+    first = fit_shape(model, state, noise, _FIRST_ROUNDS)
     if model.presses.averaging:
         model = _at_positions(model, first.state)
-    noise = noise_of(model, first.state)
-    return fit_shape(model, first.state, noise, gaussian, forward)
+    return fit_shape(model, first.state, noise_of(model, first.state))
 
 
 def _at_positions(model: JointModel, state: ArrayState) -> JointModel:
@@ -188,24 +179,19 @@ def _at_positions(model: JointModel, state: ArrayState) -> JointModel:
 
 
 def fit_shape(
-    model: JointModel,
-    state: ArrayState,
-    noise: Noise,
-    gaussian: GaussianFit,
-    forward: ForwardModel,
-    rounds: int = _MOST_ROUNDS,
+    model: JointModel, state: ArrayState, noise: Noise, rounds: int = _MOST_ROUNDS
 ) -> JointFit:
     """Fit an array by damped Gauss-Newton steps, each with the shapes of G weighed anew."""
     presses = model.presses
     everything = np.eye(len(model.waves.mix))
     spreads = SPREADS if model.layout.crosstalk.max() >= 0 else [WIDEST]
+    gaussian = model.gaussian
+    kernel = gaussian.conversion_constant * model.waves.mix @ model.gaussian_kernels[:, 0]
     for _ in range(rounds):
-        about = replace(state, kernel=model.waves.mix @ _gaussian(gaussian))
+        about = replace(state, kernel=kernel)
         data = presses.u - model.predicted(about)
         information = model.information(state, noise, everything, data)
-        weighed = [
-            weighed_by(model, information, state, gaussian, forward, spread) for spread in spreads
-        ]
+        weighed = [weighed_by(model, information, state, spread) for spread in spreads]
         likeliest = max(weighed, key=attrgetter("log_evidence"))
         best = likeliest.posterior()
         longest = abs(taken(best.change, model.layout.centres)).max() / gaussian.width
@@ -216,13 +202,7 @@ def fit_shape(
         if np.all(abs(best.change) < _SETTLED * size):
             break
     widest = weighed[-1].posterior()
-    fitted = (model, state, noise, information, gaussian, best, widest, forward)
-    return JointFit(*fitted, likeliest.log_evidence)
-
-
-def _gaussian(gaussian: GaussianFit) -> FloatArray:
-    transfer = gaussian_transfer(gaussian.geometry.k, gaussian.sigma)
-    return gaussian.conversion_constant * transfer
+    return JointFit(model, state, noise, information, best, widest, likeliest.log_evidence)
 
 
 @array_record
@@ -239,12 +219,11 @@ class Weighed:
     def posterior(self) -> Posterior:
         """Average the shapes: all parameters and the kernel, and the root of their covariance."""
         weighed = self.weighing.average(allowing=0)
-        model = self.weighing.reduced.model
-        gaussian = self.weighing.reduced.fit
-        kernels = self.weighing.basis.kernels(model.k)
+        basis = self.weighing.basis
+        kernels = basis.kernels(self.weighing.reduced.model.k)
         # The parameters given a kernel: what they are without it, less what it explains of them.
         by_kernel = self.by_others[:, 1:] @ (self.mix @ kernels)
-        of_kernel = square_root(weighed.covariance, np.diag(weighed.covariance))
+        of_kernel = square_root(weighed.covariance)
         count = len(by_kernel)
         none = np.zeros((len(kernels), count))
         root = np.block([[self.root, -by_kernel @ of_kernel], [none, kernels @ of_kernel]])
@@ -252,19 +231,14 @@ class Weighed:
         own_gain = self.by_others[:, 1:] - by_kernel @ kernel_gain
         return Posterior(
             change=self.by_others[:, 0] - by_kernel @ weighed.mean,
-            kernel=_gaussian(gaussian) + kernels @ weighed.mean,
+            kernel=basis.conversion_constant * kernels[:, 0] + kernels @ weighed.mean,
             root=root,
             gain=np.vstack([own_gain, kernels @ kernel_gain]),
         )
 
 
 def weighed_by(
-    model: JointModel,
-    information: FloatArray,
-    state: ArrayState,
-    gaussian: GaussianFit,
-    forward: ForwardModel,
-    spread: float,
+    model: JointModel, information: FloatArray, state: ArrayState, spread: float
 ) -> Weighed:
     """Integrate out what is each sensor's own by a prior, and weigh the shapes of the common G."""
     precision = prior_precision(model.layout, spread)
@@ -280,8 +254,8 @@ def weighed_by(
     by_others = root @ (root.T @ gram[own][:, others])
     left = gram[np.ix_(others, others)] - gram[own][:, others].T @ by_others
     columns = square_root(left).T
-    reduced = _reduced(columns, model.waves, gaussian, forward)
-    basis = departure_basis(gaussian, reduced)
+    reduced = _reduced(columns, model)
+    basis = departure_basis(model.gaussian, reduced)
     count = model.presses.keep.sum() - model.layout.count
     weighing = bayesian.weigh_departures(reduced, basis, count, least_noise=1.0)
     stated = np.diag(precision) > 0
@@ -292,15 +266,12 @@ def weighed_by(
     return Weighed(evidence, root, by_others, columns, model.waves.mix, weighing)
 
 
-def _reduced(
-    columns: FloatArray, waves: Waves, gaussian: GaussianFit, forward: ForwardModel
-) -> ReducedScan:
+def _reduced(columns: FloatArray, model: JointModel) -> ReducedScan:
     """Return data and kernels in the place of a reduced scan, about a Gaussian."""
-    synthesis = columns[:, 1:] @ waves.mix
-    k = forward.k
-    slope = gaussian.conversion_constant * gaussian_transfer_slope(k, gaussian.sigma)
-    flat = synthesis @ np.stack([gaussian_transfer(k, gaussian.sigma), slope], axis=1)
+    synthesis = columns[:, 1:] @ model.waves.mix
+    flat = synthesis @ model.gaussian_kernels
     none = np.zeros((len(columns), 0))
     weights = np.ones(len(columns))
+    around = (model.forward, model.gaussian)
     same = np.eye(len(columns))
-    return ReducedScan(forward, gaussian, columns[:, 0], flat, none, weights, synthesis, same)
+    return ReducedScan(*around, columns[:, 0], flat, none, weights, synthesis, same)

@@ -16,9 +16,13 @@ a gigabyte.
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 
+from memscal.estimation.departures import departure_basis
+from memscal.estimation.forward import ForwardModel
+from memscal.estimation.gaussian import GaussianFit
 from memscal.extensions.arrays.presses import Presses, Waves
 from memscal.model.arrays import BoolArray, FloatArray, IndexArray, array_record
 
@@ -113,6 +117,13 @@ class JointModel:
     waves: Waves
     layout: Layout
     own_kernels: FloatArray  # (nodes, o): transforms of changes of a sensor's own kernel, in V/Pa
+    gaussian: GaussianFit  # of the strongest sensor alone: shapes of G are departures from it
+    forward: ForwardModel  # of that sensor
+
+    @cached_property
+    def gaussian_kernels(self) -> FloatArray:
+        """Changes of the Gaussian's transform by A and by its width, (nodes, 2)."""
+        return departure_basis(self.gaussian).kernels(self.forward.k)[:, :2]
 
     @property
     def own(self) -> FloatArray:

@@ -47,7 +47,7 @@ def model(axes):
         kernel=1e-7 * waves.mix @ gaussian_transfer(k, 5e-4),
         own=np.array([[0.0], [0.02], [-0.03], [0.0]]),
     )
-    return JointModel(presses, waves, layout, own), state, k
+    return JointModel(presses, waves, layout, own, None, None), state, k
 
 
 @pytest.mark.parametrize("axes", [(0,), (0, 1)], ids=["line", "plane"])
