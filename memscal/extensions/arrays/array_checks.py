@@ -184,8 +184,9 @@ def _models_agree(fit: JointFit, compared: JointFit) -> Failing:
     both = []
     # How wide the prior of the crosstalk is may differ between them.
     for each in (fit.by_widest, compared.by_widest):
-        numbers = array_numbers(each, each.posterior, each.posterior.root)
-        roots = np.vstack([numbers.of_a[used], numbers.of_crosstalk[near]])
+        root = each.posterior.root
+        numbers = array_numbers(each, root)
+        roots = np.vstack([numbers.of_a[used], root[each.model.layout.crosstalk[near]]])
         values = np.append(numbers.log_a[used], each.state.crosstalk[near])
         both.append((values, np.sum(roots**2, axis=1)))
     difference = both[0][0] - both[1][0]

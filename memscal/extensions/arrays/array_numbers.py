@@ -1,15 +1,13 @@
-"""Numbers of an array from its joint fit: A, centres and crosstalk, shapes, and their errors."""
+"""Conversion constants and shapes of an array from its joint fit, and their errors."""
 
 from __future__ import annotations
-
-from collections.abc import Mapping
 
 import numpy as np
 
 from memscal.extensions.arrays.array_data import ALL, KernelModes
-from memscal.extensions.arrays.joint_fit import JointFit, Posterior
+from memscal.extensions.arrays.joint_fit import JointFit
 from memscal.extensions.arrays.joint_model import taken
-from memscal.model.arrays import Arrays, BoolArray, FloatArray, array_record
+from memscal.model.arrays import FloatArray, array_record
 
 #: Modes of the kernel of less than this share of the largest are nothing, and no more than so many.
 _SMALLEST = 1e-3
@@ -22,38 +20,31 @@ class ArrayNumbers:
 
     log_a: FloatArray  # (m,)
     of_a: FloatArray  # (m, c)
-    of_centres: FloatArray  # (2, m, c)
-    of_crosstalk: FloatArray  # (m, m, c)
     kernels: FloatArray  # (1 or m, nodes): transforms of G
     changes: FloatArray  # (1 or m, nodes, c): of these before they are divided by their integrals
     of_total: FloatArray  # (1 or m, c): of the integrals, relative
 
 
-def array_numbers(fit: JointFit, posterior: Posterior, columns: FloatArray) -> ArrayNumbers:
+def array_numbers(fit: JointFit, columns: FloatArray) -> ArrayNumbers:
     """Return the numbers of a fit, and of columns (p + nodes, c) their changes."""
     model = fit.model
     layout = model.layout
     wavenumbers = fit.reference.wavenumbers
-    m = len(fit.state.gain)
     own = model.own_kernels @ fit.state.own.T
     # Of equal kernels one stands for all.
     shown = own if layout.own.size else own[:, :1]
-    kernels = (posterior.kernel[:, None] + shown).T
+    kernels = (fit.posterior.kernel[:, None] + shown).T
     changes = np.repeat(columns[None, layout.count :], len(kernels), axis=0)
     for j, places in enumerate(layout.own):
         changes[j % len(kernels)] += model.own_kernels @ taken(columns, places)
     total = wavenumbers.integrals(kernels.T)
     integrals = np.stack([wavenumbers.integrals(change) for change in changes])
     of_total = integrals / total[:, None]
-    centres = np.zeros((2, m, columns.shape[1]))
-    centres[list(model.presses.axes)] = taken(columns, layout.centres)
     # In place: these are hundreds of megabytes of a large array of own shapes.
     changes /= total[:, None, None]
     return ArrayNumbers(
         np.log(fit.state.gain) + np.log(total),
         taken(columns, layout.gains) + of_total,
-        centres,
-        taken(columns, layout.crosstalk),
         kernels / total[:, None],
         changes,
         of_total,
@@ -77,20 +68,3 @@ def kernel_modes(fit: JointFit, numbers: ArrayNumbers) -> tuple[KernelModes, Flo
         sizes.append(size[:count, None] / size[0] * right[:count])
         owners += [ALL if alike else j] * count
     return KernelModes(np.vstack(changes), np.array(owners)), np.vstack(sizes)
-
-
-def stacked(numbers: ArrayNumbers, estimated: BoolArray, modes: FloatArray) -> FloatArray:
-    """Return columns of all parameters of an array, (p, c), in their order."""
-    parts = [numbers.of_a, *numbers.of_centres, numbers.of_crosstalk[estimated], modes]
-    return np.vstack(parts)
-
-
-def input_columns(fit: JointFit, products: Mapping[str, FloatArray]) -> Arrays:
-    """Return what changes of the kernel times the reference (nodes,) do to the posterior."""
-    reference = fit.reference.values
-    effects = {}
-    for name, product in products.items():
-        # A change of the stress acts as one of the kernel.
-        ratio = np.divide(product, reference, out=np.zeros_like(product), where=reference != 0)
-        effects[name] = -fit.posterior.gain @ (fit.model.waves.mix @ ratio)
-    return effects

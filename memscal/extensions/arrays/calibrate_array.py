@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from os import PathLike
-from typing import Literal, NamedTuple, get_args
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -23,12 +23,7 @@ from memscal.estimation.reference_spectra import (
 )
 from memscal.extensions.arrays.array_checks import array_checks, array_messages
 from memscal.extensions.arrays.array_data import ArrayReadings, nearest_width
-from memscal.extensions.arrays.array_numbers import (
-    array_numbers,
-    input_columns,
-    kernel_modes,
-    stacked,
-)
+from memscal.extensions.arrays.array_numbers import array_numbers, kernel_modes
 from memscal.extensions.arrays.joint_fit import JointFit, fit_array, fit_shape
 from memscal.extensions.arrays.joint_model import ArrayState, JointModel, Layout, Noise, taken
 from memscal.extensions.arrays.presses import (
@@ -105,14 +100,6 @@ class ArrayCalibration(Shown, Gridded):
     def passed(self) -> bool:
         """Whether every quality check passed."""
         return self.array.passed
-
-
-class _Begun(NamedTuple):
-    """What a fit of the used sensors starts from."""
-
-    model: JointModel
-    state: ArrayState
-    noise: Noise
 
 
 @single_threaded()
@@ -313,7 +300,7 @@ def _begun(
     found: Sorted,
     presses: Presses,
     crosstalk: CrosstalkModel | Sequence[tuple[str, str]],
-) -> _Begun:
+) -> tuple[JointModel, ArrayState, Noise]:
     """Return the model of the used sensors, and where its fit starts."""
     points = measured_points(prepared.scans[0])
     references = expected_spectra(
@@ -354,7 +341,7 @@ def _begun(
     )
     deviation = np.where(used, _AT_FIRST * found.peak, 1.0)
     nothing = np.zeros((n, n))
-    return _Begun(model, state, Noise(deviation**2, nothing, nothing))
+    return model, state, Noise(deviation**2, nothing, nothing)
 
 
 def _own_fit(fit: JointFit, *, shapes: bool) -> JointFit:
@@ -388,7 +375,11 @@ def _effects(prepared: Prepared, fit: JointFit) -> Arrays:
         # All distances are larger: the transform of a function of them is dilated.
         product = fit.reference.values * kernel
         products["position_scale"] = -scale * (2 * product + k * np.gradient(product, k))
-    return input_columns(fit, products)
+    # A change of the stress acts as one of the kernel.
+    stress = fit.reference.values
+    seen = stress != 0
+    by_kernel = fit.posterior.gain @ fit.model.waves.mix[:, seen]
+    return {name: -by_kernel @ (product[seen] / stress[seen]) for name, product in products.items()}
 
 
 def _array(scan: Scan, prepared: Prepared, found: Sorted, fit: JointFit) -> SensorArray:
@@ -397,10 +388,14 @@ def _array(scan: Scan, prepared: Prepared, found: Sorted, fit: JointFit) -> Sens
     presses = fit.model.presses
     inputs = _effects(prepared, fit)
     columns = np.column_stack([fit.posterior.root, *inputs.values()])
-    numbers = array_numbers(fit, fit.posterior, columns)
+    numbers = array_numbers(fit, columns)
     modes, of_modes = kernel_modes(fit, numbers)
-    near = (fit.model.layout.crosstalk >= 0) & used
-    everything = stacked(numbers, near, of_modes)
+    layout = fit.model.layout
+    near = (layout.crosstalk >= 0) & used
+    of_centres = np.zeros((2, used.size, columns.shape[1]))
+    of_centres[list(presses.axes)] = taken(columns, layout.centres)
+    of_crosstalk = columns[layout.crosstalk[near]]
+    everything = np.vstack([numbers.of_a, *of_centres, of_crosstalk, of_modes])
     count = fit.posterior.root.shape[1]
     effects = {name: everything[:, count + i] for i, name in enumerate(inputs)}
     n = used.size
@@ -409,21 +404,21 @@ def _array(scan: Scan, prepared: Prepared, found: Sorted, fit: JointFit) -> Sens
         effects[name] = np.zeros(len(everything))
         effects[name][:n] = -share
     state = fit.state
-    unknown = np.repeat(~used[:, None], 2, axis=1)
-    unknown[:, [axis for axis in (0, 1) if axis not in presses.axes]] = True
+    missing = np.where(used, 0.0, np.nan)
+    centres = np.full((n, 2), np.nan)
+    centres[:, presses.axes] = state.centres[:, presses.axes] + missing[:, None]
     k = fit.model.forward.k
     widths = [nearest_width(k, kernel, fit.model.gaussian.sigma) for kernel in numbers.kernels]
     first = prepared.scans[0]
     rod = first.set_up.indenter
     assert isinstance(rod, Rod)
     spread = scan.layout_uncertainty
-    missing = np.where(used, 0.0, np.nan)
-    of_baselines = taken(fit.posterior.root, fit.model.layout.drift[:, 0])
+    of_baselines = taken(fit.posterior.root, layout.drift[:, 0])
     return SensorArray(
         sensors=tuple(scan.sensors),
         used=used,
         conversion_constants=np.exp(numbers.log_a) + missing,
-        centres=np.where(unknown, np.nan, state.centres),
+        centres=centres,
         crosstalk=np.where(near, state.crosstalk, np.eye(n)),
         estimated=near,
         gaussian_sigmas=np.resize(widths, n) + missing,
