@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import NamedTuple
 
 import numpy as np
 from scipy.special import chdtrc, chdtri, ndtr, ndtri
@@ -40,11 +39,8 @@ _UNSTATED = 0.03
 _PRESSES = 500
 
 
-class Failing(NamedTuple):
-    """A check, and the numbers of the sensors that fail it."""
-
-    check: QualityCheck
-    sensors: IndexArray | tuple[()] = ()
+Failing = tuple[QualityCheck, IndexArray]
+"""A check, and the numbers of the sensors that fail it."""
 
 
 def array_checks(
@@ -54,15 +50,14 @@ def array_checks(
     names = np.array(array.sensors)
     failing = {}
     results = [*_of_all(array, found), *_of_fit(fit, compared, array)]
-    for each in results:
-        numbers = np.asarray(each.sensors, np.intp)
-        failing[each.check.name] = tuple(names[numbers].tolist())
-    return tuple(each.check for each in results), failing
+    for one, numbers in results:
+        failing[one.name] = tuple(names[numbers].tolist())
+    return tuple(one for one, _ in results), failing
 
 
 def _of_all(array: ArrayData, found: Sorted) -> Iterator[Failing]:
     dead = np.flatnonzero(found.dead)
-    yield Failing(
+    yield (
         check(
             "dead_taxels",
             dead.size,
@@ -73,7 +68,7 @@ def _of_all(array: ArrayData, found: Sorted) -> Iterator[Failing]:
         dead,
     )
     clipped = np.flatnonzero(found.at_ceiling)
-    yield Failing(
+    yield (
         check(
             "saturation",
             found.at_ceiling.sum(),
@@ -91,7 +86,7 @@ def _of_all(array: ArrayData, found: Sorted) -> Iterator[Failing]:
         pressed[:, axes].max(axis=0) - places[:, axes],
     ).min(axis=1)
     short = _BEYOND - margins / array.film.thickness
-    yield Failing(
+    yield (
         check(
             "ends_covered",
             short.max(),
@@ -123,7 +118,7 @@ def _layout(array: ArrayData) -> Failing:
     variance = variances.mean(axis=0) + stated**2
     squares = left**2 / variance
     degrees = 2 * used.size - 4
-    return Failing(
+    return (
         check(
             "layout",
             squares.sum(),
@@ -151,29 +146,20 @@ def _of_fit(fit: JointFit, compared: JointFit, array: ArrayData) -> Iterator[Fai
         yield _common_mode(fit)
 
 
-def crosstalk_uncertainty(fit: JointFit) -> float:
-    """Median standard uncertainty of the estimated crosstalk by its widest prior."""
-    places = fit.model.layout.crosstalk[fit.model.layout.crosstalk >= 0]
-    return float(np.median(np.linalg.norm(fit.widest.root[places], axis=1)))
-
-
 def _identified(fit: JointFit, near: BoolArray) -> Failing:
-    centres = fit.state.centres
-    pitch = np.hypot(*(centres[:, None] - centres).T)[near].min()
-    value = crosstalk_uncertainty(fit)
-    limited = value > IDENTIFIED
-    return Failing(
+    places = fit.model.layout.crosstalk[fit.model.layout.crosstalk >= 0]
+    value = np.median(np.linalg.norm(fit.widest.root[places], axis=1))
+    return (
         check(
             "crosstalk_identified",
             value,
             IDENTIFIED,
             "Median standard uncertainty of the crosstalk by the readings alone, whatever its "
-            f"spread, at a least distance of {pitch * 1e3:.3g} mm. A failure means that crosstalk "
-            "and the shape of G are one thing to this scan: it is left out of the table, and A has "
-            "the uncertainty that this costs. Scan a raster, take a common shape, or a thinner "
-            "film.",
+            "spread. A failure means that crosstalk and the shape of G are one thing to this scan: "
+            "it is left out of the table, and A has the uncertainty that this costs. Scan a "
+            "raster, take a common shape, or a thinner film.",
         ),
-        np.flatnonzero(near.any(axis=1)) if limited else (),
+        np.flatnonzero(near.any(axis=1) & (value > IDENTIFIED)),
     )
 
 
@@ -187,15 +173,14 @@ def _models_agree(fit: JointFit, compared: JointFit) -> Failing:
         root = each.posterior.root
         numbers = array_numbers(each, root)
         roots = np.vstack([numbers.of_a[used], root[each.model.layout.crosstalk[near]]])
-        values = np.append(numbers.log_a[used], each.state.crosstalk[near])
-        both.append((values, np.sum(roots**2, axis=1)))
-    difference = both[0][0] - both[1][0]
+        found = np.append(numbers.log_a[used], each.state.crosstalk[near])
+        both.append([found, np.sum(roots**2, axis=1)])
+    values, variances = np.moveaxis(np.array(both), 1, 0)
     # The variance of the difference is that of the variances, at least a share of the larger one.
-    larger = np.maximum(both[0][1], both[1][1])
-    apart = np.maximum(abs(both[0][1] - both[1][1]), _LEAST_APART * larger)
-    z = difference / np.sqrt(apart)
+    apart = np.maximum(np.ptp(variances, axis=0), _LEAST_APART * variances.max(axis=0))
+    z = np.ptp(values, axis=0) / np.sqrt(apart)
     m = used.size
-    return Failing(
+    return (
         check(
             "crosstalk_model",
             np.sqrt(np.mean(z**2)),
@@ -204,7 +189,7 @@ def _models_agree(fit: JointFit, compared: JointFit) -> Failing:
             "uncertainty, root mean square. A failure means that the sensors' shapes differ: take "
             "own ones, of a raster.",
         ),
-        used[abs(z[:m]) > chdtri(1, FALSE_ALARM / m) ** 0.5],
+        used[z[:m] > chdtri(1, FALSE_ALARM / m) ** 0.5],
     )
 
 
@@ -227,7 +212,7 @@ def _common_kernel(own: JointFit) -> Failing:
     square = data @ np.linalg.pinv(information, rcond=1e-8, hermitian=True) @ data
     degrees = used.size - 1
     z = abs(own.state.own[used, 0]) / np.linalg.norm(own.posterior.root[places], axis=1)
-    return Failing(
+    return (
         check(
             "common_kernel",
             square,
@@ -261,7 +246,7 @@ def _chi_square(fit: JointFit, array: ArrayData) -> Failing:
     most = -ndtri(FALSE_ALARM / used.size)
     worst = int(np.argmax(beyond))
     name = array.sensors[used[worst]]
-    return Failing(
+    return (
         check(
             "array_chi_square",
             ratio[worst],
@@ -288,7 +273,7 @@ def _press_errors(fit: JointFit) -> Failing:
     explained = np.sum(residual * weighted, axis=1) ** 2 / np.where(size > 0, size, 1.0)
     ratios = explained.mean(axis=0)
     count = len(explained)
-    return Failing(
+    return (
         check(
             "press_errors",
             ratios.max(),
@@ -296,7 +281,8 @@ def _press_errors(fit: JointFit) -> Failing:
             "What an error of place, or of load, common to all sensors explains of the residuals "
             "of a press, over what noise has it explain. A failure means that place or load "
             "scatters by more than is stated (x_errors, normal_load_errors).",
-        )
+        ),
+        np.flatnonzero([]),
     )
 
 
@@ -311,7 +297,7 @@ def _common_mode(fit: JointFit) -> Failing:
     np.fill_diagonal(z, 0.0)
     used = fit.model.presses.used.sum()
     limit = float(-ndtri(FALSE_ALARM / (used * (used - 1))))
-    return Failing(
+    return (
         check(
             "common_mode",
             z.max(),
