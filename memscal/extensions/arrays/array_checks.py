@@ -104,6 +104,8 @@ def _of_all(array: ArrayData, found: Sorted) -> Iterator[Failing]:
 
 def _layout(array: ArrayData) -> Failing:
     """Compare the centres with the layout, shifted, turned and scaled."""
+    from scipy.spatial.distance import pdist
+
     used = np.flatnonzero(array.used)
     assert array.layout is not None
     fitted = fitted_layout(array.layout, array.centres[used], array.used)[used]
@@ -112,9 +114,7 @@ def _layout(array: ArrayData) -> Failing:
     variances = array.uncertainties()[n : 3 * n].reshape(2, n)[:, used] ** 2
     stated = array.layout_uncertainty
     if stated is None:
-        apart = array.layout[used][:, None] - array.layout[used]
-        distance = np.hypot(apart[..., 0], apart[..., 1])
-        stated = _UNSTATED * distance[distance > 0].min()
+        stated = _UNSTATED * pdist(array.layout[used]).min()
     variance = variances.mean(axis=0) + stated**2
     squares = left**2 / variance
     degrees = 2 * used.size - 4
@@ -147,7 +147,8 @@ def _of_fit(fit: JointFit, compared: JointFit, array: ArrayData) -> Iterator[Fai
 
 
 def _identified(fit: JointFit, near: BoolArray) -> Failing:
-    places = fit.model.layout.crosstalk[fit.model.layout.crosstalk >= 0]
+    places = fit.model.layout.crosstalk
+    places = places[places >= 0]
     value = np.median(np.linalg.norm(fit.widest.root[places], axis=1))
     return (
         check(
@@ -318,9 +319,10 @@ def array_messages(
     if found.dead.any():
         names = ", ".join(np.array(scan.sensors)[found.dead])
         yield Message("dead_taxels", f"Dead and left out: {names}.", "warning")
-    places = fit.model.layout.crosstalk[fit.model.layout.crosstalk >= 0]
+    numbers = fit.model.layout.crosstalk
+    places = numbers[numbers >= 0]
     if places.size:
-        values = fit.state.crosstalk[fit.model.layout.crosstalk >= 0]
+        values = fit.state.crosstalk[numbers >= 0]
         # Alike for all pairs it is seen by its mean; of a single pair by the whole.
         of_mean = np.linalg.norm(fit.posterior.root[places].mean(axis=0))
         covariance = fit.widest.root[places] @ fit.widest.root[places].T
@@ -333,8 +335,12 @@ def array_messages(
             f"probability of as much is p = {p_value:.2g}.",
         )
     stated = prepared.scans[0]
-    owners = {"load": stated, "thickness": stated.set_up.film, "radius": stated.set_up.indenter}
-    known = {name: getattr(of, f"{name}_uncertainty") for name, of in owners.items()}
-    yield from uncertainty_unstated_messages(known)
+    yield from uncertainty_unstated_messages(
+        {
+            "load": stated.load_uncertainty,
+            "thickness": stated.set_up.film.thickness_uncertainty,
+            "radius": stated.set_up.indenter.radius_uncertainty,
+        }
+    )
     if scan.synthetic is not None:
         yield Message("synthetic", "The scan is synthetic: its truth is stored in it.")

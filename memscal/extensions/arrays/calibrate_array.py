@@ -394,8 +394,7 @@ def _array(scan: Scan, prepared: Prepared, found: Sorted, fit: JointFit) -> Sens
     near = (layout.crosstalk >= 0) & used
     of_centres = np.zeros((2, used.size, columns.shape[1]))
     of_centres[list(presses.axes)] = taken(columns, layout.centres)
-    of_crosstalk = columns[layout.crosstalk[near]]
-    everything = np.vstack([numbers.of_a, *of_centres, of_crosstalk, of_modes])
+    everything = np.vstack([numbers.of_a, *of_centres, columns[layout.crosstalk[near]], of_modes])
     count = fit.posterior.root.shape[1]
     effects = {name: everything[:, count + i] for i, name in enumerate(inputs)}
     n = used.size
