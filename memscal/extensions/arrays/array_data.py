@@ -27,6 +27,7 @@ from memscal.model.arrays import (
     IndexArray,
     Values,
     array_record,
+    floats,
     keyword_array_record,
 )
 from memscal.model.checks import Checked, Message, QualityCheck
@@ -183,10 +184,10 @@ class ArrayData(Checked):
         """Return what has the transforms (nodes,) or (nodes, m) at radii in m."""
         return hankel_transform(self.k, transforms, r) / (2 * np.pi) ** 2
 
-    def distances(self, i: int) -> tuple[FloatArray, FloatArray]:
-        """Return where the presses are from a sensor, (2, t), and how far: on a line, signed."""
+    def distances(self, i: int) -> FloatArray:
+        """Return how far the presses are from a sensor, (t,), in m: on a line, signed."""
         away = np.stack([self.readings.x, self.readings.y]) - self.places[i][:, None]
-        return away, away[0] if self.on_a_line else np.hypot(*away)
+        return floats(away[0] if self.on_a_line else np.hypot(*away))
 
     def kernel_of(self, i: int) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return a sensor's transform of G, its changes by modes, and the modes' root."""

@@ -15,19 +15,17 @@ _BEYOND = 1.0
 _STEP = 0.1
 
 
-def bound_map(
-    array: ArrayData, of_place: Axes, of_force: Axes, *, force: float = 1.0, shear: float = 0.3
-) -> None:
-    """Draw u(x), in mm, and u(force), in percent, of a force (N) at a point; of a row as curves."""
-    seeking = Seeking.on(array, "point", shear, _BEYOND)
+def bound_map(array: ArrayData, of_place: Axes, of_force: Axes) -> None:
+    """Draw u(x), in mm, and u(force), in percent, at a point and the load; of a row as curves."""
+    seeking = Seeking.on(array, "point", 0.0, _BEYOND)
     axis = seeking.axes[0]
     name = "xy"[axis]
     places = seeking.grid(_STEP)
-    covariance = bound(array, places, force, shear=shear)
+    covariance = bound(array, places, array.load)
     x, y = places.T / MM
     for panel, i, scale, label in (
         (of_place, axis, MM, f"least $u({name})$ (mm)"),
-        (of_force, 2, force / 100, "least $u$(force) (%)"),
+        (of_force, 2, array.load / 100, "least $u$(force) (%)"),
     ):
         errors = np.sqrt(covariance[:, i, i]) / scale
         centres = seeking.fields.centres / MM

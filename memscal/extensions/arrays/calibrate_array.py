@@ -72,8 +72,6 @@ class ArrayCalibration(Shown, Gridded):
     ----------
     array : SensorArray
         The result, ready to be saved and to locate contacts.
-    fit : JointFit, optional
-        The posterior that it was made of; none of measured fields.
 
     Examples
     --------
@@ -85,7 +83,6 @@ class ArrayCalibration(Shown, Gridded):
     """
 
     array: SensorArray
-    fit: JointFit | None = None
 
     def __repr__(self) -> str:
         """Return the array, without its arrays."""
@@ -207,7 +204,7 @@ def calibrate_array(
         messages=tuple(messages),
         input_scan=opened.source,
     )
-    return ArrayCalibration(replace(array, checks=checks, failing=failing, process=process), fit)
+    return ArrayCalibration(replace(array, checks=checks, failing=failing, process=process))
 
 
 def _opened(scan: Scan | str | PathLike[str], *, accept_altered: bool) -> Scan:

@@ -8,7 +8,6 @@ from matplotlib.figure import Figure
 
 from memscal.extensions.arrays.array_checks import IDENTIFIED
 from memscal.extensions.arrays.bound_figure import bound_map
-from memscal.extensions.arrays.measured_figure import measured_figure
 from memscal.extensions.arrays.sensor_array import SensorArray
 from memscal.extensions.arrays.summary import array_of, identified
 from memscal.figures.report import Picture, Report
@@ -43,10 +42,12 @@ _CAPTION = (
 
 
 def array_figure(result: Any) -> Figure:
-    """Draw a calibrated array."""
+    """Draw a calibrated array; of measured fields the map of the bound alone."""
     array = array_of(result)
     if array.kernel == "measured":
-        return measured_figure(array)
+        with panels_of(3.6, 1, 2, note="") as (figure, panels):
+            bound_map(array, *panels)
+        return figure
     deviation = np.sqrt(np.diag(array.noise))
     readings = array.readings
     residuals = (readings.u - readings.predicted) / deviation[:, None]
@@ -58,7 +59,7 @@ def array_figure(result: Any) -> Figure:
         _draw_matrix(scan, array, residuals, "residual over noise", _FARTHEST)
         scan.set(aspect="auto", xlabel="press")
         _draw_readings(profiles, array)
-        bound_map(array, of_place, of_force, force=array.load)
+        bound_map(array, of_place, of_force)
         _draw_matrix(noise, array, correlation, "correlation of the noise", 1.0)
         rest.remove()
     return figure
@@ -112,7 +113,7 @@ def _draw_readings(axes: Axes, array: SensorArray) -> None:
     """Draw what each sensor reads near the rod, measured and predicted, in a row of its own."""
     readings = array.readings
     for i in np.flatnonzero(array.used).tolist():
-        _, distance = array.distances(i)
+        distance = array.distances(i)
         near = np.argsort(distance)
         near = near[abs(distance[near]) < _NEAR * array.film.thickness]
         both = np.stack([readings.u[i], readings.predicted[i]]) - readings.background[i]

@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from memscal.errors import FormatError
 from memscal.extensions.arrays.array_data import RADII, ArrayData, ArrayReadings, KernelModes
 from memscal.formats import groups
 from memscal.formats.digest import require_schema, require_unaltered
@@ -119,10 +118,4 @@ def read_open(file: SafeFile) -> ArrayData:
         "checks": groups.read_quality(file),
         "process": groups.read_process(file),
     }
-    data = ArrayData(**{n: read[n] for n in read.keys() & ArrayData.__dataclass_fields__.keys()})
-    if len(columns) != 3 * len(names) + len(data.pairs) + len(data.modes.owner):
-        raise FormatError(
-            f"{file.name} does not fit together: its roots have {len(columns)} rows.",
-            cure="Calibrate the array again.",
-        )
-    return data
+    return ArrayData(**{n: read[n] for n in read.keys() & ArrayData.__dataclass_fields__.keys()})

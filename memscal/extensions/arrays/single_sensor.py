@@ -12,7 +12,6 @@ from memscal.model.apparatus import (
     ParameterSet,
     Reconvolution,
     TransferFunction,
-    round_wavenumbers,
 )
 from memscal.model.arrays import TINY, Arrays, FloatArray
 from memscal.model.instrument import StressSensor
@@ -64,9 +63,6 @@ def single_sensor(array: ArrayData, name: str) -> ApparatusFunction:
     with_a = of_g @ of_a / np.maximum(errors * np.linalg.norm(of_a), TINY)
     kernel_changes = _by_source(array, of_g + np.outer(g, of_a))
     del kernel_changes["noise"]
-    k = round_wavenumbers(resolved)
-    at_k = np.array([np.interp(k, array.k, column) for column in (kernel, *of_kernel.T)])
-    logarithms = np.vstack([of_a, rows[1] / sigma, of_a + (at_k[1:] / at_k[0]).T])
     # Without what other sensors alone fail.
     checks = [
         check
@@ -89,7 +85,6 @@ def single_sensor(array: ArrayData, name: str) -> ApparatusFunction:
             for quantity, row in zip(parameters.names, rows, strict=False)
         },
         kernel_changes=kernel_changes,
-        shared_effects=_by_source(array, logarithms),
         **{field: getattr(array, field) for field in _SAME},
     )
 
@@ -129,7 +124,7 @@ def _by_source(array: ArrayData, columns: FloatArray) -> Arrays:
 def _reconvolution(array: ArrayData, i: int, spectra: FloatArray) -> Reconvolution:
     """Return the readings of a sensor less what it reads of the others' signals."""
     readings = array.readings
-    away, distance = array.distances(i)
+    distance = array.distances(i)
     scale = array.conversion_constants[i] * readings.load
     own, gaussian = scale * array.radial(spectra.T, abs(distance)).T + readings.background[i]
     residual = readings.u[i] - readings.predicted[i]
@@ -140,11 +135,7 @@ def _reconvolution(array: ArrayData, i: int, spectra: FloatArray) -> Reconvoluti
         "u_zz_predicted": own,
         "u_zz_gaussian": gaussian,
         "residual": residual,
-        "load": readings.load,
-        "background": readings.background[i],
     }
-    if not array.on_a_line:
-        columns |= {"offset_x": away[0], "offset_y": away[1]}
     order = np.argsort(columns["x"], kind="stable")
     kept = order[np.isfinite(residual[order])]
     return Reconvolution(**{name: values[kept] for name, values in columns.items()})

@@ -66,7 +66,7 @@ def test_such_an_array_is_kept_in_a_file_and_drawn(array, tmp_path):
     assert again.film is None
     u = fields(np.array([[2e-3, 1e-3]]))
     np.testing.assert_allclose(again.locate(u).x, array.locate(u).x)
-    assert len(array.plot().axes) == 10
+    assert len(array.plot().axes) == 4
     assert "5 sensors" in str(array)
 
 

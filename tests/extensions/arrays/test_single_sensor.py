@@ -61,8 +61,6 @@ def test_it_has_the_numbers_and_uncertainties_of_the_array():
     # Where 3 u(width) (sigma k)^2 = 1.
     resolved = (3 * OF_WIDTH) ** -0.5 / SIGMA
     assert apparatus.resolved_wavenumber == pytest.approx(resolved, rel=0.01)
-    shared = apparatus.shared_effects
-    assert shared["load"] == pytest.approx([-OF_LOAD, 0.0] + [-OF_LOAD] * (len(shared["load"]) - 2))
 
 
 def test_its_readings_are_without_the_crosstalk():
