@@ -115,8 +115,8 @@ dead_taxels: sensors without a signal
     left out: press on them, look at their wiring
 ends_covered: what a scan lacks of two thicknesses beyond the last sensor
     scan farther
-layout: centres of sensors against their layout
-    sensors lie elsewhere, or names are mixed up
+layout: centres against their layout, shifted, turned up to 30 degrees, scaled up to 50 %
+    wrong place, name, unit or axis
 crosstalk_identified: median u of the crosstalk by the readings alone
     scan a raster, take a common shape, or a thinner film
 crosstalk_model: A and crosstalk by a common against own shapes, in u
@@ -126,7 +126,7 @@ common_kernel: fall of chi-square by widths of the sensors' own
 array_chi_square: residuals of the worst sensor against the noise
     look at reference, farther pairs, drift, memory of the film
 press_errors: what common errors of place and load explain, over chance
-    state x_errors and normal_load_errors
+    state x_errors, normal_load_errors (--position-error, --load-scatter)
 common_mode: noise that two sensors share against that of their board
     state boards
 """

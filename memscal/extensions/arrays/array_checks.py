@@ -35,6 +35,8 @@ _BEYOND = 2.0
 _SHORT = 0.1
 #: Standard uncertainty of a layout that states none, over the least distance.
 _UNSTATED = 0.03
+#: A layout is turned and scaled by a factor this near to 1: by 30 degrees, or by a half.
+_ALIKE = 0.5
 #: Presses whose covariances are held at once.
 _PRESSES = 500
 
@@ -97,38 +99,41 @@ def _of_all(array: ArrayData, found: Sorted) -> Iterator[Failing]:
         ),
         np.flatnonzero(array.used)[short > _SHORT],
     )
-    planar = not np.isnan(array.centres[array.used]).any()
-    if array.layout is not None and planar and array.used.sum() > 2:
+    if array.layout is not None and array.used.sum() > 2:
         yield _layout(array)
 
 
 def _layout(array: ArrayData) -> Failing:
-    """Compare the centres with the layout, shifted, turned and scaled."""
+    """Compare the centres with the layout, shifted, turned and scaled; of a line along it."""
     from scipy.spatial.distance import pdist
 
     used = np.flatnonzero(array.used)
     assert array.layout is not None
-    fitted = fitted_layout(array.layout, array.centres[used], array.used)[used]
-    left = np.hypot(*(array.centres[used] - fitted).T)
-    n = len(array.sensors)
-    variances = array.uncertainties()[n : 3 * n].reshape(2, n)[:, used] ** 2
-    stated = array.layout_uncertainty
-    if stated is None:
-        stated = _UNSTATED * pdist(array.layout[used]).min()
-    variance = variances.mean(axis=0) + stated**2
-    squares = left**2 / variance
-    degrees = 2 * used.size - 4
+    known = np.isfinite(array.centres[used]).all(axis=0)
+    centres = np.where(known, array.centres[used], 0.0)
+    layout = array.layout * known
+    fitted, factor = fitted_layout(layout, centres, array.used)
+    left = centres - (layout if abs(factor - 1) > _ALIKE else fitted)[used]
+    left -= left.mean(axis=0)
+    if array.layout_uncertainty is None:
+        stated = _UNSTATED * pdist(centres).min()
+    else:  # in another unit it is as much too large, or too small, as the layout
+        stated = abs(factor) * array.layout_uncertainty
+    variance = np.nanmean(array.centre_uncertainties[used] ** 2, axis=1) + stated**2
+    squares = np.sum(left**2, axis=1) / variance
+    axes = known.sum()
+    degrees = axes * (used.size - 2)
     return (
         check(
             "layout",
             squares.sum(),
             chi_square_limit(degrees),
-            "Chi-square of the centres against the layout, which may be shifted, turned and "
-            "scaled. A failure means that sensors are not where the layout has them, or that "
-            "names are mixed up.",
+            "Chi-square of the centres against the layout, of a line along it. The layout may be "
+            "shifted, turned by up to 30 degrees and scaled by up to 50 %. A failure means that "
+            "sensors are elsewhere, or that names, units or axes of the layout are wrong.",
             float(chdtrc(degrees, squares.sum())),
         ),
-        used[squares > chdtri(2, FALSE_ALARM / used.size)],
+        used[squares > chdtri(axes, FALSE_ALARM / used.size)],
     )
 
 
@@ -281,7 +286,8 @@ def _press_errors(fit: JointFit) -> Failing:
             float(chdtri(count, FALSE_ALARM / 2)) / count,
             "What an error of place, or of load, common to all sensors explains of the residuals "
             "of a press, over what noise has it explain. A failure means that place or load "
-            "scatters by more than is stated (x_errors, normal_load_errors).",
+            "scatters by more than is stated (x_errors, --position-error; "
+            "normal_load_errors, --load-scatter).",
         ),
         np.flatnonzero([]),
     )

@@ -316,7 +316,7 @@ def _begun(
     centres = high @ presses.places.T / total[:, None]
     layout = centres
     if scan.layout is not None:
-        layout = fitted_layout(scan.layout, centres[used], used)
+        layout, _ = fitted_layout(scan.layout, centres[used], used)
         # Neighbours may read what a dead sensor does not tell.
         centres = np.where(used[:, None], centres, layout)
     pairs = _pairs(scan, layout, crosstalk) & used[:, None] & np.isfinite(centres[:, 0])

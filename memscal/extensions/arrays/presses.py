@@ -132,10 +132,16 @@ def _clipped(u: FloatArray, noise: float) -> IndexArray:
     return falling[:0]
 
 
-def fitted_layout(layout: FloatArray, centres: FloatArray, used: BoolArray) -> FloatArray:
-    """Shift, turn and scale a layout (n, 2) to the centres (m, 2) of the used sensors: (n, 2)."""
+def fitted_layout(
+    layout: FloatArray, centres: FloatArray, used: BoolArray
+) -> tuple[FloatArray, complex]:
+    """Shift, turn and scale a layout (n, 2) to the centres (m, 2) of the used sensors: (n, 2).
+
+    The factor is that of complex numbers: its angle is the turn.
+    """
     # A similarity is a linear function of complex numbers.
     design = layout @ [1, 1j]
     columns = np.stack([np.ones_like(design), design], axis=1)
-    fitted = columns @ np.linalg.lstsq(columns[used], centres @ [1, 1j])[0]
-    return np.stack([fitted.real, fitted.imag], axis=1)
+    solution = np.linalg.lstsq(columns[used], centres @ [1, 1j])[0]
+    fitted = columns @ solution
+    return np.stack([fitted.real, fitted.imag], axis=1), solution[1]

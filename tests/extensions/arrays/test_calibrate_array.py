@@ -93,11 +93,28 @@ def test_pairs_are_chosen(crosstalk, count):
     assert np.count_nonzero(array.crosstalk) == 4 + count
 
 
-def test_wrong_layouts_and_unstated_errors_of_presses_fail_their_checks():
-    scan = simulated_scan(3, 3, seed=4)[0]
-    swapped = replace(scan, layout=scan.layout[[1, 0, *range(2, 9)]])
-    failing = memscal.calibrate_array(swapped).array.failing
-    assert set(failing["layout"]) >= {"T00", "T01"}
+@pytest.mark.parametrize("shape", [(1, 4), (3, 3)], ids=["row", "grid"])
+def test_a_layout_is_where_the_sensors_are_or_fails(shape):
+    scan = simulated_scan(*shape, seed=4)[0]
+    layout = scan.layout
+    n = len(layout)
+    turn = np.array([[np.cos(0.3), np.sin(0.3)], [-np.sin(0.3), np.cos(0.3)]])
+    for places, uncertainty, passes in (
+        (1.2 * layout @ turn + 1e-3, None, True),
+        (layout[[1, 0, *range(2, n)]], None, False),
+        (-layout, None, False),
+        (1e3 * layout, 20e-3, False),
+        (1e-3 * layout, 20e-9, False),
+        (np.zeros((n, 2)), None, False),
+    ):
+        errors = None if uncertainty is None else np.full((n, 2), uncertainty)
+        wrong = replace(scan, layout=places, layout_uncertainty=errors)
+        calibration = memscal.calibrate_array(wrong)
+        assert calibration.passed == passes
+        assert ("T00" in calibration.array.failing["layout"]) != passes
+
+
+def test_unstated_errors_of_presses_fail_their_check():
     jitter = simulated_scan(1, 6, seed=4, errors=Errors(noise=0.002, place=30e-6, load=0.02))[0]
     assert memscal.calibrate_array(jitter).passed
     unstated = replace(jitter, x_errors=None, normal_load=None, normal_load_errors=None)
