@@ -245,13 +245,11 @@ def _presses(
     if np.bincount(passes).min() < MINIMUM_POSITIONS:
         passes = np.zeros_like(passes)
     # Each pass has a baseline and a drift.
-    drift = []
-    for number in range(passes.max() + 1):
-        inside = (passes == number).astype(float)
-        drift.append(inside)
-        for along in places[list(axes)]:
-            half = np.ptp(along) / 2
-            drift.append(inside * ((along - along.min()) / half - 1))
+    along = places[list(axes)]
+    low = along.min(axis=1, keepdims=True)
+    half = np.ptp(along, axis=1, keepdims=True) / 2
+    straight = np.vstack([np.ones_like(passes), (along - low) / half - 1])
+    drift = np.vstack([straight * (passes == number) for number in range(passes.max() + 1)])
     stated = scan.u_zz_errors
     board = np.zeros(len(u), np.intp) if scan.board is None else scan.board
     return Presses(
@@ -259,7 +257,7 @@ def _presses(
         load=np.where(np.isfinite(loads), loads, 0.0),
         u=np.where(keep, u, 0.0),
         keep=keep,
-        drift=np.stack(drift, axis=1),
+        drift=drift.T,
         axes=axes,
         place_errors=np.broadcast_to(x_errors, scan.shape).ravel(),
         load_errors=np.where(np.isfinite(errors), errors, 0.0),

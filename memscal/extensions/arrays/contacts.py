@@ -32,8 +32,8 @@ class Contacts(FrozenArrays, Told):
     flags : tuple of str
         What is to be said of each frame, parted by semicolons; empty where all is well:
         ``no reading``, ``too few readings``, ``no contact``, ``saturated`` (readings at a ceiling
-        are left out), ``edge`` (more than a film's thickness outside the sensors), ``weak`` (a
-        force known to 20 % at best), ``misfit`` (a p-value below 0.001).
+        are left out), ``edge`` (more than a film's thickness outside the sensors), ``misfit`` (a
+        p-value below 0.001).
     assumed_shear : float
         Standard deviation of each component of shear over normal force, before the readings.
     indenter : Rod, Sphere or None

@@ -67,8 +67,6 @@ _OUTSIDE = 0.5
 _FORCES = 1.5
 #: Forces are above this, in N.
 _LEAST = 1e-9
-#: A force of a larger relative uncertainty is weak.
-_WEAK = 0.2
 
 Touch = str | RoundIndenter
 """What presses: ``"point"``, a rod, or a sphere."""
@@ -287,7 +285,6 @@ def locate(
         "no contact": sought & np.isnan(force),
         "saturated": saturated.any(axis=1),
         "edge": seeking.outside(places) > seeking.thickness,
-        "weak": np.sqrt(covariance[:, 2, 2]) > _WEAK * force,
         "misfit": p_value < FALSE_ALARM,
     }
     rows = np.transpose([*said.values()])

@@ -83,7 +83,6 @@ class Sorted:
     at_ceiling: IndexArray  # (n,): how many readings
     peak: FloatArray  # (n,): over the baseline, in V
     baseline: FloatArray  # (n,)
-    noise: FloatArray  # (n,): of the outermost readings
 
 
 def sorted_readings(scan: Scan, places: FloatArray, u: FloatArray) -> Sorted:
@@ -119,7 +118,7 @@ def sorted_readings(scan: Scan, places: FloatArray, u: FloatArray) -> Sorted:
     # The few outermost readings of one sensor may scatter by less than its noise.
     dead = stated & (peak <= _DEAD * np.maximum(noise, np.median(noise)))
     used = stated & ~dead
-    return Sorted(keep & used[:, None], used, dead, at_ceiling * used, peak, baseline, noise)
+    return Sorted(keep & used[:, None], used, dead, at_ceiling * used, peak, baseline)
 
 
 def _clipped(u: FloatArray, noise: float) -> IndexArray:
