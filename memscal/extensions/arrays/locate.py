@@ -285,6 +285,7 @@ def locate(
         "no contact": sought & np.isnan(force),
         "saturated": saturated.any(axis=1),
         "edge": seeking.outside(places) > seeking.thickness,
+        "strong": force > fields.most,
         "misfit": p_value < FALSE_ALARM,
     }
     rows = np.transpose([*said.values()])

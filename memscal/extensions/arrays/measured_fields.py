@@ -28,6 +28,7 @@ class MeasuredFields:
 
     array: ArrayData
     unit = "1"
+    most = np.inf
 
     @cached_property
     def nodes(self) -> ArrayPair:

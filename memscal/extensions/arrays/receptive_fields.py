@@ -10,8 +10,9 @@ Per newton of a contact at r, sensor i reads :math:`H_i(r) = \sum_j C_{ij} A_j f
 the pressure's transform :math:`\hat p` per newton, and the film's transfer functions T and N
 (:mod:`memscal.mechanics.film_response`).  A shear force Q along x that is spread as the pressure is
 adds :math:`\cos\phi\,g_j` per newton: its first moment along x is h, which is the balance of
-moments.  T is that by which the rod of the scan makes the calculated stress of the calibration, so
-that a contact like it reads what was measured, whatever the law of the film.
+moments.  T is that of a linear film and, where the film's law is another one, a change of it that
+grows with the depth of the contact in a linear film.  At the depth of the scan's rod it is the one
+that makes the calculated stress of the calibration: a contact like it reads what was measured.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from memscal.errors import DomainError
 from memscal.estimation.reference_spectra import rod_spectrum
 from memscal.extensions.arrays.array_data import ALL, ArrayData
 from memscal.measurement.posterior import film_changes, film_transfer, per_pressure
+from memscal.mechanics.contact import Contact
 from memscal.mechanics.film_response import base_response
 from memscal.mechanics.indent import indent
 from memscal.model.arrays import (
@@ -33,7 +35,7 @@ from memscal.model.arrays import (
     array_record,
     floats,
 )
-from memscal.model.film import LINEAR, ElasticFilm
+from memscal.model.film import LINEAR
 from memscal.model.indenter import Rod, RoundIndenter
 from memscal.model.scan import SetUp
 
@@ -42,8 +44,13 @@ _LARGEST_KH = 20.0
 #: Contacts are sought so many thicknesses beyond the sensors; steps of the tables in one thickness.
 MARGIN = 2.0
 _STEPS = 200
-#: Loads over that of the calibration at which a sphere is pressed.
-_LOADS = np.geomspace(0.01, 20.0, 18)
+#: Loads of the tables over that of the calibration, which is one of them.
+_LOADS = np.geomspace(1 / 64, 16.0, 21)
+#: A film of another law than a linear one is known to so many depths of the scan's rod: at two the
+#: stress per newton is 4 % off.
+_DEEPEST = 1.5
+#: Share by which a force is changed for the derivative of the stress per newton by it.
+_GROWN = 1e-3
 #: A radius in place of zero, as a share of the tables' step.
 _AXIS = 1e-6
 
@@ -73,9 +80,15 @@ class ReceptiveFields:
 
     unit = "N"
 
+    @property
+    def most(self) -> float:
+        """The force (N) up to which the tables reach; of one table, any."""
+        return float(self.loads[-1]) if self.loads.size > 1 else np.inf
+
     def radius(self, force: FloatArray) -> FloatArray:
         """Contact radii (m) under forces."""
-        return np.interp(force, self.loads, self.contact_radii)
+        # Hertz has them as P^(1/3).
+        return np.interp(np.cbrt(force), np.cbrt(self.loads), self.contact_radii)
 
     def normal(self, places: FloatArray, force: FloatArray | float = 1.0) -> ArrayTriple:
         """Fields per newton without shear, and their derivatives by x and y, (m, n) each."""
@@ -86,9 +99,11 @@ class ReceptiveFields:
     def forward(self, places: FloatArray, force: FloatArray, shear: FloatArray) -> ArrayPair:
         """Readings (m, n), and their derivatives by x, y, force and the two shears, (m, n, 5)."""
         slopes = self.mixing @ self._sources(places, force, shear)
+        more = self.mixing @ self._sources(places, (1 + _GROWN) * force, shear)
+        value = slopes[..., 2].copy()
+        slopes[..., 2] += (more[..., 2] - value) / _GROWN
         slopes[..., [0, 1, 3, 4]] *= force[:, None, None]
-        # How the stress per newton changes with the force is left out of its derivative.
-        return force[:, None] * slopes[..., 2], slopes
+        return force[:, None] * value, slopes
 
     def errors(self, places: FloatArray, force: FloatArray, shear: FloatArray) -> FloatArray:
         """Changes of the readings by one u of each independent error of the array, (m, n, c)."""
@@ -133,7 +148,8 @@ class ReceptiveFields:
         share = (apart - near)[..., None]
         near += radii * (np.arange(self.sensors.size) % kernels)
         # The stress falls by the square of the contact radius, which Hertz has as P^(2/3).
-        place = np.interp(np.power(force, 2 / 3), self.loads ** (2 / 3), np.arange(loads))
+        pressed = np.maximum(force, 0.0)
+        place = np.interp(np.power(pressed, 2 / 3), self.loads ** (2 / 3), np.arange(loads))
         place = np.reshape(place, (-1, 1))
         found = np.zeros((*apart.shape, columns))
         for above in range(min(loads, 2)):
@@ -156,17 +172,28 @@ def receptive_fields(array: ArrayData, indenter: RoundIndenter | None = None) ->
     kernels = array.kernels[sensors] if len(array.kernels) > 1 else array.kernels
     at = np.minimum(nodes.k, array.k[-1])
     kernels = radial_spline(array.k, kernels.T)(at).T
-    loads, contact_radii, pressures = _pressures(film, indenter, array.load, nodes.k)
     set_up = SetUp(film, array.indenter, array.load, None)
+    contacts = _contacts(set_up, indenter)
+    loads, depths, contact_radii = floats([[c.load, c.depth, c.contact_radius] for c in contacts]).T
+    pressures = np.ones((loads.size, nodes.k.size))
+    if indenter is None:
+        contact_radii = np.zeros(loads.size)
+    else:
+        transforms = [one.traction.pressure_transform(nodes.k) for one in contacts]
+        pressures = 2 * np.pi * floats(transforms) / loads[:, None]
     by_pressure, by_shear = base_response(nodes.k * film.thickness, film.poisson_ratio)
-    transfer = film_transfer(set_up, nodes)
-    if array.reference is not None:
-        linear = RadialSpectrum(nodes, by_pressure)
-        change = array.load * radial_spline(array.k, array.reference)(at)
-        change -= rod_spectrum(set_up, linear, LINEAR)
-        transfer = by_pressure + per_pressure(set_up, linear, change)
+    linear = RadialSpectrum(nodes, by_pressure)
+    if array.reference is None:
+        change = film_transfer(set_up, nodes) - by_pressure
+    else:
+        of_rod = array.load * radial_spline(array.k, array.reference)(at)
+        change = per_pressure(set_up, linear, of_rod - rod_spectrum(set_up, linear, LINEAR))
+    share = np.ones(loads.size)
+    if film.law != LINEAR:
+        share = depths / indent(film, array.indenter, load=array.load, strain="linear").depth
+    transfers = by_pressure + share[:, None] * change
 
-    spectra = (pressures[:, None] * transfer * kernels).reshape(-1, nodes.k.size).T
+    spectra = ((pressures * transfers)[:, None] * kernels).reshape(-1, nodes.k.size).T
     falling = -nodes.k[:, None] * spectra
     # A sensor is seen from the contact in the direction opposite to their offset.
     ratio = -(by_shear / by_pressure)[:, None]
@@ -179,14 +206,14 @@ def receptive_fields(array: ArrayData, indenter: RoundIndenter | None = None) ->
             nodes.synthesise(ratio * falling, r, order=2) / r[:, None] ** 2,
         ]
     )
-    shape = (len(pressures), len(kernels), radii.size, len(columns))
+    shape = (loads.size, len(kernels), radii.size, len(columns))
 
     # What is uncertain is taken at the middle load, and of the mean kernel.
-    modes = radial_spline(array.k, array.modes.changes.T)(at).T * transfer
+    modes = radial_spline(array.k, array.modes.changes.T)(at).T * (by_pressure + change)
     names = [*array.effects]
     inputs = {n: c for n, c in film_changes(set_up, nodes).items() if n in names}
     changes = np.vstack([modes, *(kernels.mean(axis=0) * change for change in inputs.values())])
-    changes = changes * pressures[len(pressures) // 2]
+    changes = changes * pressures[loads.size // 2]
     first = array.root.shape[1]
     column = [first + names.index(name) for name in inputs]
     by_input = np.eye(array.columns.shape[1])[column]
@@ -205,18 +232,24 @@ def receptive_fields(array: ArrayData, indenter: RoundIndenter | None = None) ->
     )
 
 
-def _pressures(
-    film: ElasticFilm, indenter: RoundIndenter | None, load: float, k: FloatArray
-) -> ArrayTriple:
-    """Return loads, contact radii, and transforms of the pressure per newton, (loads, nodes)."""
-    if indenter is None:
-        return np.array([load]), np.zeros(1), np.ones((1, k.size))
-    loads = np.array([load]) if isinstance(indenter, Rod) else load * _LOADS
-    try:
-        contacts = indent(film, indenter, load=loads, strain="linear")
-    except DomainError:
-        # The largest loads go through the film.
-        loads = loads[: loads.size // 2]
-        contacts = indent(film, indenter, load=loads, strain="linear")
-    transforms = [2 * np.pi * one.traction.pressure_transform(k) / one.load for one in contacts]
-    return loads, floats([one.contact_radius for one in contacts]), floats(transforms)
+def _contacts(set_up: SetUp, indenter: RoundIndenter | None) -> list[Contact]:
+    """Press an indenter, or the scan's rod, on a linear film, as deep as it goes."""
+    film, rod, load, _ = set_up
+    pressed = indenter or rod
+    # Where nothing changes with the load one table serves them all.
+    constant = film.law == LINEAR and isinstance(pressed, Rod)
+    deepest = np.inf
+    if film.law != LINEAR:
+        deepest = _DEEPEST * indent(film, rod, load=load, strain="linear").depth
+    contacts: list[Contact] = []
+    for factor in [1.0] if constant else _LOADS:
+        try:
+            contact = indent(film, pressed, load=factor * load, strain="linear")
+        except DomainError:
+            if contacts:
+                break
+            raise
+        if contact.depth > deepest:
+            break
+        contacts.append(contact)
+    return contacts

@@ -46,6 +46,28 @@ def test_a_rod_reads_the_reference_of_the_calibration(places):
     np.testing.assert_allclose(found, 1.05 * linear, atol=1e-3 * linear.max())
 
 
+@pytest.mark.parametrize("load", [0.1, 0.4, 1.3])
+def test_a_rod_at_another_load_reads_what_the_law_of_the_film_makes_of_it(load, places):
+    """A neo-Hookean film, calibrated at 1 N, against the finite-strain table of rods."""
+    pressed = press_rod(FILM, ROD, load).base_spectrum(NODES.k) / load
+    expected = blurred(pressed, GRID, places)
+    fields = receptive_fields(replace(GRID, reference=None), ROD)
+    found, *_ = fields.normal(places, np.full(len(places), load))
+    np.testing.assert_allclose(found, expected, atol=0.012 * expected.max())
+    linear = press_rod(LINEAR, ROD, load).base_spectrum(NODES.k) / load
+    # What is tested: without the law the field is off by more than that, at 0.1 N by 2 %.
+    assert abs(found - blurred(linear, GRID, places)).max() > 0.012 * expected.max()
+
+
+@pytest.mark.parametrize("load", [0.2, 1.0, 5.0])
+def test_the_contact_radius_of_a_small_sphere_is_that_which_it_is_pressed_to(load):
+    sphere = memscal.Sphere(radius=1e-3)
+    fields = receptive_fields(replace(GRID, film=LINEAR), sphere)
+    pressed = memscal.indent(LINEAR, sphere, load=load, strain="linear")
+    assert fields.radius(load) == pytest.approx(pressed.contact_radius, rel=5e-3)
+    assert load < fields.most < 10.0  # N, where it sinks into the film
+
+
 @pytest.mark.parametrize("ratio", [0.3, 0.5])
 def test_shear_moves_the_stress_by_its_moment_and_carries_no_force(ratio):
     film = replace(LINEAR, poisson_ratio=ratio)
@@ -86,12 +108,10 @@ def test_derivatives_are_those_of_the_readings(indenter, places):
 
     state = np.column_stack([places, force, shear])
     _, slopes = fields.forward(places, force, shear)
-    # A sphere's contact grows with the force, which the derivative by the force leaves out.
-    close = [3e-3, 3e-3, 3e-3 if indenter in (None, ROD) else 0.12, 3e-3, 3e-3]
     for i, step in enumerate([2e-5, 2e-5, 1e-3, 1e-3, 1e-3]):
         ahead = step * np.eye(5)[i]
         change = (readings(state + ahead) - readings(state - ahead)) / (2 * step)
-        np.testing.assert_allclose(slopes[..., i], change, atol=close[i] * abs(change).max())
+        np.testing.assert_allclose(slopes[..., i], change, atol=3e-3 * abs(change).max())
 
 
 def test_errors_are_those_of_the_parameters(places):
