@@ -32,10 +32,11 @@ class Contacts(FrozenArrays, Told):
     flags : tuple of str
         What is to be said of each frame, parted by semicolons; empty where all is well:
         ``no reading``, ``too few readings``, ``no contact``, ``saturated`` (readings at a ceiling
-        are left out), ``edge`` (more than a film's thickness outside the sensors), ``strong`` (beyond
-        the forces for which fields are calculated, 16 times that of the scan, or fewer where the
-        film ends or is not linear: their field per newton holds), ``misfit`` (a p-value below
-        0.001).
+        are left out), ``edge`` (more than half a film's thickness outside the sensors, or such a
+        place, where small changes of readings are large forces, is not excluded), ``strong``
+        (beyond the forces for which fields are calculated, 16 times that of the scan, or fewer
+        where the film ends or is not linear: their field per newton holds), ``misfit`` (a p-value
+        below 0.001).
     assumed_shear : float
         Standard deviation of each component of shear over normal force, before the readings.
     indenter : Rod, Sphere or None

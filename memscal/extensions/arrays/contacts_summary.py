@@ -2,6 +2,7 @@
 
 import csv
 import io
+from collections import Counter
 
 import numpy as np
 
@@ -47,14 +48,20 @@ def _values(contacts: Contacts) -> Values:
 def answer(contacts: Contacts) -> str:
     """Return how many contacts were found, how well they are known, and what was assumed."""
     found = np.isfinite(contacts.force)
+    sound = found & (np.array(contacts.flags) == "")
+    flags = Counter("; ".join(filter(None, contacts.flags)).split("; "))
     lines = [f"{counted(int(found.sum()), 'contacts')} in {counted(found.size, 'frames')}."]
-    if found.any():
-        errors = contacts.uncertainties[found] / [MM, MM, 1.0]
-        errors[:, 2] /= contacts.force[found]
+    if not sound.all():
+        said = ", ".join(f"{flag} ({count})" for flag, count in flags.items())
+        lines.append(f"Frames by flag: {said}.")
+    if sound.any():
+        errors = contacts.uncertainties[sound] / [MM, MM, 1.0]
+        errors[:, 2] /= contacts.force[sound]
         x, y, force = np.median(errors, axis=0)
         known = [f"u({name}) = {u:.2g} mm" for name, u in (("x", x), ("y", y)) if u > 0]
         lines.append(
-            f"Median standard uncertainties: {', '.join(known)}, {percent(force)} of force."
+            f"Median standard uncertainties of those without a flag ({sound.sum()}): "
+            f"{', '.join(known)}, {percent(force)} of force."
         )
     return "\n".join([*lines, contacts.assumed])
 

@@ -142,22 +142,30 @@ class Seeking:
 
     def starts(
         self, u: FloatArray, grid: FloatArray, fields: FloatArray
-    ) -> tuple[BoolArray, FloatArray]:
-        """Return in which frames (m, s) a contact is seen, and three states of each to begin at."""
+    ) -> tuple[BoolArray, FloatArray, FloatArray]:
+        """Return in which frames (m, s) a contact is seen, and three states of each to begin at.
+
+        The third are the least chi-squares of these at places outside.
+        """
         tuned = fields @ self.whitener.T
         size = np.linalg.norm(tuned, axis=1)
         size = np.maximum(size, _SEEN * size.max())
         score = u @ (tuned / size[:, None]).T
         seen = score.max(axis=1) > DETECTED
         score = score[seen]
+        away = self.outside(grid)
+        outside = score.max(axis=1, where=away > self.near, initial=0.0)
         states = np.zeros((len(score), _STARTS, 5))
         for i in range(_STARTS):
-            best = score.argmax(axis=1)
+            # Far outside huge forces fit as well as a node that is beside the place: the first
+            # start is among the sensors.
+            sought = score if i else np.where(away > 0, -np.inf, score)
+            best = sought.argmax(axis=1)
             states[:, i, :2] = grid[best]
-            states[:, i, 2] = np.maximum(score.max(axis=1) / size[best], _LEAST)
+            states[:, i, 2] = np.maximum(sought.max(axis=1) / size[best], _LEAST)
             apart = np.linalg.norm(grid - grid[best, None], axis=-1)
             score[apart < self.thickness] = -np.inf
-        return seen, states
+        return seen, states, np.sum(u[seen] ** 2, axis=1) - outside**2
 
     def fitted(self, u: FloatArray, starts: FloatArray) -> FloatArray:
         """Return the state of least chi-square of frames (m, s), by damped Gauss-Newton steps."""
@@ -181,7 +189,7 @@ class Seeking:
         return floats(state.reshape(-1, _STARTS, 5)[np.arange(best.size), best])
 
     def judged(self, u: FloatArray, state: FloatArray) -> ArrayTriple:
-        """Return states, covariances (m, 3, 3) and p-values by noise and the array's errors."""
+        """Return states, covariances (m, 3, 3) and chi-squares by noise and the array's errors."""
         residual, slopes = self.rows(u, state)
         errors = self.whitener @ self.fields.errors(*self.contact(state))
         s = u.shape[1]
@@ -191,9 +199,7 @@ class Seeking:
         residual, slopes = both[..., 0], both[..., 1:]
         step, inverse = steps(residual, slopes)
         square = np.sum((residual - np.einsum("mrf,mf->mr", slopes, step)) ** 2, axis=1)
-        # Of as many readings as there are unknowns chi-square says nothing.
-        p_value = chdtrc((s - len(self.axes) - 1) or np.nan, square)
-        return self.moved(state, step), self.covariance(inverse), floats(p_value)
+        return self.moved(state, step), self.covariance(inverse), floats(square)
 
     def covariance(self, inverse: FloatArray) -> FloatArray:
         """Return covariances (m, 3, 3) of x, y and force; NaN where the sensors do not tell."""
@@ -261,6 +267,7 @@ def locate(
     state = np.full((len(values), 5), np.nan)
     covariance = np.full((len(values), 3, 3), np.nan)
     p_value = np.full(len(values), np.nan)
+    outside = np.zeros(len(values), bool)
     sought = np.zeros(len(values), bool)
     grid = seeking.grid()
     on_grid = fields.normal(grid)[0]
@@ -273,10 +280,14 @@ def locate(
         some = replace(seeking, whitener=whitener)
         for part in slices(frames.size, _BATCH):
             u = np.nan_to_num(values[frames[part]]) @ whitener.T
-            seen, starts = some.starts(u, grid, on_grid)
+            seen, starts, elsewhere = some.starts(u, grid, on_grid)
             of = frames[part][seen]
             best = some.fitted(u[seen], starts)
-            state[of], covariance[of], p_value[of] = some.judged(u[seen], best)
+            state[of], covariance[of], square = some.judged(u[seen], best)
+            # Not excluded is what is worse by less than what a contact is seen by.
+            outside[of] = elsewhere < square + DETECTED**2
+            # Of as many readings as there are unknowns chi-square says nothing.
+            p_value[of] = chdtrc((kept.sum() - len(seeking.axes) - 1) or np.nan, square)
     places, force, ratios = seeking.contact(state)
     blank = ~np.isfinite(readings).any(axis=1)
     said = {
@@ -284,7 +295,7 @@ def locate(
         "too few readings": ~sought & ~blank,
         "no contact": sought & np.isnan(force),
         "saturated": saturated.any(axis=1),
-        "edge": seeking.outside(places) > seeking.thickness,
+        "edge": outside | (seeking.outside(places) > seeking.near),
         "strong": force > fields.most,
         "misfit": p_value < FALSE_ALARM,
     }

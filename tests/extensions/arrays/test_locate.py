@@ -184,6 +184,48 @@ def test_a_contact_outside_is_at_the_edge():
     assert ["edge" in flag for flag in found.flags] == [True, False]
 
 
+@pytest.mark.parametrize("shear", [0.0, 0.3])
+def test_a_contact_among_four_sensors_is_found_among_them(shear, seed):
+    """Far outside a force of 200 N fits as well as a node of the grid beside the place."""
+    four = replace(known_array(2, 2, noise=1e-3), film=LINEAR)
+    places = np.random.default_rng(seed).uniform(-0.9e-3, 0.9e-3, (60, 2))
+    found = four.locate(four.predict(places, 1.0), shear=shear)
+    np.testing.assert_allclose(np.stack([found.x, found.y], axis=1), places, atol=1e-5)
+    np.testing.assert_allclose(found.force, 1.0, rtol=1e-3)
+
+
+def test_what_is_unflagged_outside_of_the_sensors_holds(seed):
+    """By little signal a weak contact inside and a strong one outside look alike."""
+    noisy = replace(GRID, noise=100 * GRID.noise)
+    rng = np.random.default_rng(seed)
+    places = np.stack([rng.uniform(3.5e-3, 9e-3, 300), rng.uniform(-3e-3, 3e-3, 300)], axis=1)
+    forces = np.exp(rng.uniform(-1, 3, 300))
+    u = noisy.predict(places, forces) + noise_of(noisy, rng, 300)
+    found = noisy.locate(u, shear=0.0)
+    bad = abs(found.x - places[:, 0]) > 4 * found.uncertainties[:, 0]
+    assert bad.sum() > 20
+    assert sum(flag == "" for flag in np.array(found.flags)[bad]) <= 0.02 * 300
+
+
+def test_a_pull_is_no_sound_press(seed):
+    places, forces = drawn(GRID, np.random.default_rng(seed))
+    found = GRID.locate(TRUE_GRID.readings(places, -forces))
+    assert "" not in found.flags
+
+
+def test_the_summary_counts_what_is_wrong_and_leaves_it_out_of_uncertainties():
+    u = TRUE_GRID.readings(np.array([[0.3e-3, 0.2e-3], [5.5e-3, 0.0]]), 1.0)
+    wrong = u[0] + 0.3 * u.max() * (np.arange(16) % 5 == 0)
+    frames = np.vstack([u, 100 * wrong, 0 * u[0]])
+    found = GRID.locate(frames, indenter=ROD, shear=0.0)
+    said = found.answer()
+    assert "3 contacts in 4 frames." in said
+    assert all(f"{flag} (1)" in said for flag in ("edge", "misfit", "no contact"))
+    alone = GRID.locate(u[:1], indenter=ROD, shear=0.0).answer()
+    [line] = [line for line in alone.splitlines() if "uncertainties" in line]
+    assert line in said
+
+
 def test_a_contact_of_another_size_is_a_misfit():
     u = TRUE_GRID.readings(np.zeros((1, 2)), 2.0, indenter=memscal.Sphere(radius=50e-3))
     assert "misfit" in GRID.locate(u, shear=0.0).flags[0]
