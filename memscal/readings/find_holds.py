@@ -92,7 +92,17 @@ def find_holds(
         before = _before_each(columns, line, held, waiting, dwell)
         notes.append("The mean of the rows before its press is subtracted from each hold.")
     holds = _averaged(columns, line, held, before, len(runs) - len(held), reading, notes)
-    return replace(holds, highest=highest, ceiling=ceiling)
+    errors = {"u_zz_errors": holds.u_errors}
+    for name in columns:
+        if " of " in name:
+            one = _averaged({"u_zz": columns[name]}, line, held, before, 0, reading, [])
+            errors[name.replace("u_zz", "u_zz_errors")] = one.u_errors
+    every = np.array([*errors.values()])
+    # The sum of an array scatters as no sensor does.
+    errors["u_zz_errors"] = np.nanmedian(every[len(every) > 1 :], axis=0)
+    # Readings of few digits may not scatter.
+    mean = {**holds.mean, **(errors if every.all() else {})}
+    return replace(holds, mean=mean, highest=highest, ceiling=ceiling)
 
 
 def _averaged(

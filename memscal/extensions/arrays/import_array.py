@@ -13,6 +13,7 @@ from memscal.formats.tables.columns import NamedColumns, Wanted
 from memscal.formats.tables.dialect import is_number
 from memscal.formats.tables.scan import ImportedScan
 from memscal.formats.tables.sheets import open_table
+from memscal.formats.tables.stated import TableLayout
 from memscal.formats.units import to_si
 from memscal.model.arrays import Columns, Values
 from memscal.model.scan import Scan
@@ -39,16 +40,19 @@ def columns_of_array(table: NamedColumns, asked: Sequence[str | int]) -> dict[st
     return {"u_zz": table.names[numbers[0]], **(named if len(named) > 1 else {})}
 
 
-def add_up(columns: Columns, u_sign: int) -> list[str]:
+def add_up(columns: Columns, layout: TableLayout) -> list[str]:
     """Make ``u_zz`` the sum of all sensors' readings, which get their sign; return a note."""
     names = [name for name in columns if name.startswith(_OF)]
     total = np.zeros(columns["u_zz"].shape)
     for name in names:
-        columns[name] *= u_sign
+        columns[name] *= layout.u_sign
         if not np.isnan(columns[name]).all():  # one without readings changes no other's
             total += columns[name]
     columns["u_zz"] = total
-    return [f"An array of {len(names)} sensors; u_zz is their sum where holds are found in it."]
+    notes = [f"An array of {len(names)} sensors."]
+    if layout.holds:
+        notes.append("Holds are found in the sum of all, of which scatter and change are told.")
+    return notes
 
 
 def array_scan(
@@ -62,8 +66,9 @@ def array_scan(
     stated: Values = {} if layout is None else read_layout(layout, names)
     if ceiling is not None:  # a calibration leaves out what is there, and says of which sensor
         stated["reading_high"] = to_si(ceiling, of.unit, of.dimension, "ceiling (--ceiling)")
-    if scan.u_zz_errors is not None:
-        stated["u_zz_errors"] = np.broadcast_to(scan.u_zz_errors, u_zz.shape)
+    if scan.u_zz_errors is not None:  # of holds each sensor has its own
+        own = [channels.pop(name) for name in scan.channels if name.startswith("u_zz_errors")]
+        stated["u_zz_errors"] = np.broadcast_to(own or [scan.u_zz_errors], u_zz.shape)
     array = replace(scan, u_zz=u_zz, channels=channels, sensors=tuple(names), **stated)
     most = int(np.nan_to_num(u_zz).argmax()) // scan.u_zz.size
     return array, array.of_sensor(most)

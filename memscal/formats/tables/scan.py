@@ -185,7 +185,7 @@ def import_table(
     wanted, reading = _wanted(table, named, layout)
     columns, notes = _read_columns(table, wanted, layout.u_sign, uncertainties.noise)
     if array:
-        notes += hook("add_up")(columns, layout.u_sign)
+        notes += hook("add_up")(columns, layout)
     presses = make_positions(columns, layout, notes, table.lines)
     if numbering:
         columns["repeat"] = _lines(columns, numbering, notes)
@@ -198,9 +198,6 @@ def import_table(
             hook("require_all_held")(holds, presses)
         notes += holds.notes
         columns = dict(holds.mean)
-        # Readings of few digits may not scatter; the sum of an array scatters as no sensor does.
-        if holds.u_errors.all() and not array:
-            columns["u_zz_errors"] = holds.u_errors
     of = wanted["u_zz"]
     ceiling = None if array else layout.ceiling
     clipped = _leave_out_clipped(columns, holds, ceiling, of, reading, notes)
@@ -428,7 +425,7 @@ def _scan_of(
     if "y" not in columns and "normal_load" in columns:
         messages += _mixed_loads(columns["normal_load"], columns.get("repeat"), conditions.indenter)
     columns = _as_rows(columns)
-    further = [name for name in columns if name.startswith(("u_xz", "u_yz", "u_zz of "))]
+    further = [name for name in columns if " of " in name or name.startswith(("u_xz", "u_yz"))]
     channels: Columns = {name: columns.pop(name) for name in further}
     if load_scatter is not None:
         columns["normal_load_errors"] = load_scatter * columns["normal_load"]

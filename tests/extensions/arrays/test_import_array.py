@@ -74,15 +74,20 @@ def test_holds_are_found_where_any_sensor_feels_the_press(seed):
     pressed = np.tile(np.repeat([0.0, 1.0], [10, 20]), 19)
     log = {"x": np.repeat(places, 30)}
     rng = np.random.default_rng(seed)
-    for centre in (-6, 0, 6):
+    for centre, noise in ((-6, 4e-3), (0, 2e-3), (6, 1e-3)):
         signal = 3 * np.exp(-((log["x"] - centre) ** 2) / 8)
-        log[f"u{centre}"] = pressed * signal + 1e-3 * rng.standard_normal(pressed.size)
+        log[f"u{centre}"] = pressed * signal + noise * rng.standard_normal(pressed.size)
+    log["u9"] = np.full(pressed.size, np.nan)
     layout = TableLayout(x_unit="mm", u_unit="mV", holds=True)
     scan = import_table(log, x="x", u="u*", layout=layout)
     expected = 3e-3 * np.exp(-((places - 6) ** 2) / 8)
     # Means of ten rows or more: within six standard errors.
     np.testing.assert_allclose(scan.u_zz[2], expected, atol=6e-6 / 10**0.5)
-    assert scan.u_zz_errors is None
+    # Of twenty rows or fewer, which scatter by 4, 2 and 1 uV.
+    of_means = 1e-6 * np.array([4, 2, 1]) / 20**0.5
+    np.testing.assert_allclose(np.median(scan.u_zz_errors[:3], axis=1), of_means, rtol=0.4)
+    assert np.isnan(scan.u_zz[3]).all()
+    assert "Standard uncertainty of each reading: not stated" not in scan.notes
 
 
 def test_a_long_array_is_held_against_the_width_of_one_sensor():
