@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from memscal.errors import InputError
 from memscal.extensions.arrays.array_data import ArrayData
 from memscal.extensions.arrays.locate import Seeking, Touch, steps
-from memscal.model.arrays import FloatArray, floats
+from memscal.model.arrays import FloatArray, finite_vector, floats, require_positive
 
 
 def bound(
@@ -21,10 +21,14 @@ def bound(
     shear: float = 0.3,
 ) -> FloatArray:
     """Covariance of x, y and force by the noise, (m, 3, 3): :meth:`SensorArray.bound`."""
+    require_positive("The least force", np.min(force), "N")
     seeking = replace(Seeking.on(array, indenter, shear), near=np.inf)
     residual, slopes = seeking.rows(np.zeros(1), states(places, force, 0.0))
-    _, inverse = steps(residual, slopes)
-    return seeking.covariance(inverse)
+    told = slopes[..., 0].any(axis=1)
+    bounds = np.full((len(slopes), 3, 3), np.nan)
+    _, inverse = steps(residual[told], slopes[told])
+    bounds[told] = seeking.covariance(inverse)
+    return bounds
 
 
 def predict(
@@ -48,4 +52,6 @@ def states(places: ArrayLike, force: ArrayLike, shear: ArrayLike) -> FloatArray:
         )
     count = len(at)
     forces = np.broadcast_to(floats(force), count)
-    return np.column_stack([at, forces, np.broadcast_to(floats(shear), (count, 2))])
+    stated = np.column_stack([at, forces, np.broadcast_to(floats(shear), (count, 2))])
+    finite_vector("The array of places, forces and shears", stated.ravel())
+    return stated

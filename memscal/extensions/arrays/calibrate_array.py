@@ -275,8 +275,10 @@ def _pairs(
     if not isinstance(crosstalk, str):
         pairs = np.zeros((n, n), bool)
         for row, column in crosstalk:
-            require_names("There is no sensor", [row, column], scan.sensors)
-            pairs[scan.sensors.index(row), scan.sensors.index(column)] = row != column
+            require_names("There is no sensor", [row], scan.sensors)
+            others = [name for name in scan.sensors if name != row]
+            require_names("There is no other sensor", [column], others)
+            pairs[scan.sensors.index(row), scan.sensors.index(column)] = True
         return pairs
     require_names("There is no model of crosstalk", [crosstalk], get_args(CrosstalkModel))
     apart = ~np.eye(n, dtype=bool)

@@ -91,4 +91,7 @@ class Contacts(FrozenArrays, Told):
         if self.unit != "N":
             return "Assumed: presses like those of the scan; forces are in such presses."
         shear = f"shear over normal force of 0 ± {self.assumed_shear:g} (k = 1) along each axis"
-        return f"Assumed: {self.pressed_by}, {shear if self.assumed_shear else 'no shear'}."
+        # Of a place that is not told the row's own holds.
+        on_row = np.isnan(self.uncertainties[np.isfinite(self.force)]).any()
+        where = ", on the line of the row" * bool(on_row)
+        return f"Assumed: {self.pressed_by}{where}, {shear if self.assumed_shear else 'no shear'}."

@@ -322,7 +322,8 @@ def columns_of(array: ArrayData, readings: ArrayLike, name: str) -> FloatArray:
     count = len(array.sensors)
     if frames.ndim != 2 or frames.shape[1] != count:
         raise InputError(
-            f"{name} has {frames.shape[-1]} columns, but the array has {count} sensors.",
+            f"{name} has {frames.shape[-1]} columns, but the array has {count} sensors. "
+            f"It has {frames.ndim} dimensions, and frames have 2.",
             why="Each frame is one reading of every sensor, also of those that are not used.",
             cure="Give the columns in the order of array.sensors, NaN where a reading is missing.",
         )

@@ -206,6 +206,8 @@ def receptive_fields(array: ArrayData, indenter: RoundIndenter | None = None) ->
             nodes.synthesise(ratio * falling, r, order=2) / r[:, None] ** 2,
         ]
     )
+    # Beyond the tables there is nothing.
+    columns[:, -2:] = 0.0
     shape = (loads.size, len(kernels), radii.size, len(columns))
 
     # What is uncertain is taken at the middle load, and of the mean kernel.

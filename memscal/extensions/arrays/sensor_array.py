@@ -160,7 +160,13 @@ class SensorArray(ArrayData, Shown, Gridded):
         Raises
         ------
         InputError
-            If the places have another shape, or the indenter is another one.
+            If the places have another shape, a number is not finite, or the indenter is another
+            one.
+
+        Notes
+        -----
+        Sensors read nothing of places beyond the tables, which reach from each of them to the far
+        end of where contacts are sought: two thicknesses outside all of them.
         """
         return predict(self, places, force, indenter, shear)
 
@@ -185,7 +191,7 @@ class SensorArray(ArrayData, Shown, Gridded):
         Raises
         ------
         InputError
-            If the places have another shape, or indenter or shear make no sense.
+            If the places have another shape, or forces, indenter or shear make no sense.
 
         Examples
         --------
@@ -239,7 +245,8 @@ class SensorArray(ArrayData, Shown, Gridded):
         Raises
         ------
         InputError
-            If the rate is not above zero, or the indenter is another one.
+            If the rate is not above zero, limits or drift make no sense, the indenter is another
+            one, or no more sensors are used than a contact has unknowns: 2 in a row, 3 in a grid.
 
         Examples
         --------

@@ -51,6 +51,7 @@ from memscal.model.arrays import (
     IndexArray,
     array_record,
     floats,
+    require_non_negative,
     require_positive,
 )
 from memscal.model.checks import FALSE_ALARM
@@ -140,6 +141,8 @@ class Stream:
         require_positive("rate", rate, "Hz")
         if limit:
             low, high = map(floats, limit)
+            if not np.all(low < high):
+                raise InputError(f"The limits are {low} and {high}; the lower one is needed first.")
             array = replace(array, reading_low=low, reading_high=high)
         self._array = array
         self._rate = rate
@@ -147,6 +150,12 @@ class Stream:
         self._seeking = Seeking.on(array, indenter, 0.0, _MARGIN)
         self._told = np.array([*self._seeking.axes, 2])
         self._sensors = self._seeking.fields.sensors
+        if self._sensors.size <= self._told.size:
+            raise InputError(
+                f"{self._sensors.size} sensors of the array work, too few for a stream.",
+                why="With as many as a contact has unknowns any drift is one.",
+                cure="Use locate with readings at rest.",
+            )
         self._nodes = self._seeking.grid(_STEP)
         self._grid = self._slopes(self._nodes, array.load)
         self._errors: dict[int, ArrayPair] = {}
@@ -155,11 +164,13 @@ class Stream:
         self._unknown = (_UNKNOWN * peak) ** 2
         walks = peak * np.multiply.outer([_COMMON, 1.0], _STRENGTHS)
         if drift is not None:
+            require_non_negative("The least drift", np.min(drift))
             walks = floats(drift)[:, None]
         common, own = walks[..., None, None] ** 2 * self._length / rate
         n = self._sensors.size
         self._walk = common + own * np.eye(n)
         self._now = SimpleNamespace(
+            made=np.array([rate, self._grid.sum(), self._noise.sum(), walks.sum()]),
             frames=np.array(0),
             last=np.zeros(n),
             # Of the current block.
@@ -229,7 +240,9 @@ class Stream:
             If the state is not of such a stream.
         """
         now = vars(self._now)
-        if any(np.shape(state.get(name, [[]])) != value.shape for name, value in now.items()):
+        fits = all(np.shape(state.get(name, [[]])) == value.shape for name, value in now.items())
+        # What it was made with: rate, fields, noise and drift.
+        if not fits or not np.allclose(state["made"], self._now.made, rtol=1e-6, atol=0.0):
             raise InputError("The state is not of a stream of this array and these arguments.")
         for name, value in now.items():
             value[...] = state[name]
@@ -261,13 +274,14 @@ class Stream:
         records["flags"] = (
             FrameFlag.MISSING * missing.any(axis=1)
             + FrameFlag.SATURATED * saturated.any(axis=1)
-            + FrameFlag.DROPPED * (known.sum() < given.shape[1])
+            + FrameFlag.DROPPED * bool(self.left_out)
         )
         covariance = now.covariance[best] + self._walk[best] + self._noise
         deviations = readings - now.baselines[best]
         for seen, frames in patterns(valid & known):
             freedom = seen.sum() - self._told.size
-            if freedom < 0:
+            # Of as few the baselines do not follow either.
+            if freedom < 1:
                 records["flags"][frames] |= FrameFlag.NO_READING
                 records["force"][frames] = np.nan
                 continue

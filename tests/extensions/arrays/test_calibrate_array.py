@@ -154,6 +154,7 @@ def refused_scans():
     yield "kernel", scan, {"kernel": "shared"}, MemscalError, "common"
     yield "crosstalk", scan, {"crosstalk": "nearst"}, MemscalError, "nearest"
     yield "pair", scan, {"crosstalk": [("T00", "T1")]}, MemscalError, "T01"
+    yield "itself", scan, {"crosstalk": [("T01", "T01")]}, MemscalError, "no other sensor T01"
     yield "silent", replace(scan, u_zz=0 * scan.u_zz), {}, FitError, "3 sensors"
 
 

@@ -99,6 +99,8 @@ def test_of_a_row_y_is_that_of_the_row_and_not_known():
     assert np.isnan(found.covariance[0, 1]).all()
     assert np.isnan(found.covariance[0, :, 1]).all()
     assert np.isfinite(found.covariance[0][np.ix_([0, 2], [0, 2])]).all()
+    assert "on the line of the row" in found.assumed
+    assert "row" not in GRID.locate(TRUE_GRID.readings(np.zeros((1, 2)), 1.0)).assumed
 
 
 def test_a_missing_frame_changes_no_other_one(seed):
@@ -259,12 +261,33 @@ def test_the_assumed_shear_is_always_said():
         ({"u": np.zeros((2, 16)), "rest": np.zeros(3)}, ["rest has 3 columns", "16 sensors"]),
         ({"u": np.zeros((2, 16)), "indenter": "rod"}, ["'rod'"]),
         ({"u": np.zeros((2, 16)), "shear": -1.0}, ["shear is -1"]),
+        ({"u": np.zeros((1, 2, 16))}, ["3 dimensions"]),
     ],
 )
 def test_what_makes_no_sense_is_refused(arguments, words):
     with pytest.raises(memscal.MemscalError) as refused:
         GRID.locate(**arguments)
     assert all(word in str(refused.value) for word in words)
+
+
+@pytest.mark.parametrize(
+    ("work", "words"),
+    [
+        (lambda: GRID.predict([[np.nan, 0.0]]), "not finite"),
+        (lambda: GRID.predict([[0.0, 0.0]], np.nan), "not finite"),
+        (lambda: GRID.bound([[0.0, 0.0]], 0.0), "force is 0 N"),
+        (lambda: GRID.bound([[0.0, 0.0]], [1.0, -1.0]), "force is -1 N"),
+    ],
+)
+def test_no_contact_is_predicted(work, words):
+    with pytest.raises(memscal.MemscalError, match=words):
+        work()
+
+
+def test_far_away_sensors_read_nothing_and_tell_nothing():
+    far = [[0.05, 0.0], [1e3, 0.0]]
+    assert not GRID.predict(far).any()
+    assert np.isnan(GRID.bound(far)).all()
 
 
 @pytest.fixture

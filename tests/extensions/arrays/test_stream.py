@@ -17,6 +17,7 @@ ARRAY = known_array(3, 3, noise=0.005)
 ARRAY = replace(ARRAY, film=replace(ARRAY.film, law="linear"))
 TRUE = TrueArray(ARRAY.places, ARRAY.conversion_constants, ARRAY.crosstalk)
 FEWER = known_array(2, 2)
+WIDER = known_array(3, 3, pitch=4e-3)
 PLACE = np.array([[0.4e-3, -0.7e-3]])
 TOUCH = TRUE.readings(PLACE, 1.0, indenter=None)
 
@@ -111,6 +112,22 @@ def test_missing_saturated_and_dead_sensors_move_nothing_else(seed):
     assert found["flags"][7] & FrameFlag.NO_READING
 
 
+def test_before_a_baseline_is_known_no_sensor_is_said_to_be_left_out(seed):
+    stream = ARRAY.stream(RATE)
+    first, second = np.split(stream.push(frames(seed, 0.4)), 2)
+    assert stream.left_out == {}
+    assert np.all(first["flags"] == FrameFlag.NO_READING)
+    assert np.all(second["flags"] == 0)
+
+
+def test_too_few_sensors_say_so_in_each_frame(seed):
+    readings = frames(seed, 2)
+    readings[:, 3:] = np.nan
+    found = ARRAY.stream(RATE).push(readings)
+    assert np.all(found["flags"] & FrameFlag.NO_READING)
+    assert np.isnan(found["force"]).all()
+
+
 def test_two_contacts_and_one_outside_are_flagged(seed):
     stream = resting(seed)
     two = TRUE.readings(np.array([[-2e-3, -2e-3], [2e-3, 2e-3]]), 1.0, indenter=None).sum(axis=0)
@@ -131,6 +148,13 @@ def test_two_contacts_and_one_outside_are_flagged(seed):
         ),
         (lambda: ARRAY.stream(RATE).push(np.zeros((5, 8))), "8 columns, but the array has 9"),
         (lambda: ARRAY.stream(RATE, indenter="pen"), "indenter is 'pen'"),
+        (lambda: ARRAY.stream(2 * RATE).restore(ARRAY.stream(RATE).state()), "not of a stream"),
+        (lambda: ARRAY.stream(RATE).restore(WIDER.stream(RATE).state()), "not of a stream"),
+        (lambda: ARRAY.stream(RATE, limit=(1.0, 0.0)), "limits are 1.0 and 0.0"),
+        (lambda: ARRAY.stream(RATE, limit=(np.nan, 1.0)), "limits are nan"),
+        (lambda: ARRAY.stream(RATE, drift=(1e-4, -1e-4)), "drift is -0.0001"),
+        (lambda: known_array(1, 2).stream(RATE), "2 sensors of the array work"),
+        (lambda: replace(FEWER, used=np.arange(4) > 0).stream(RATE), "3 sensors of the array work"),
     ],
 )
 def test_what_is_no_stream_is_refused(work, words):
