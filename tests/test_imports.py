@@ -18,7 +18,6 @@ NOT_PUBLIC = {
     "FilmField",
     "Holds",
     "InputEffect",
-    "JointFit",
     "KernelModes",
     "LawComparison",
     "NoiseSpectrum",
