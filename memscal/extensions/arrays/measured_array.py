@@ -7,12 +7,17 @@ import numpy as np
 from memscal.errors import InputError
 from memscal.extensions.arrays.array_data import ArrayReadings, KernelModes
 from memscal.extensions.arrays.sensor_array import SensorArray
-from memscal.model.arrays import floats
+from memscal.model.arrays import BoolArray, floats
+from memscal.model.checks import Message
 from memscal.model.provenance import Process
 from memscal.model.scan import Scan
 
 #: Places that differ by less, in m, are one node of the raster.
 _SAME = 1e-6
+#: A sensor works if its readings vary by more than so many standard deviations of them; it has an
+#: offset if at the rim of the raster it reads more than this share of that.
+_ALIVE = 8.0
+_OFFSET = 0.2
 
 
 def measured_array(scan: Scan) -> SensorArray:
@@ -26,7 +31,14 @@ def measured_array(scan: Scan) -> SensorArray:
     from scipy.interpolate import RectBivariateSpline
 
     u = scan.u_zz.reshape(len(scan.sensors), -1)
-    places = [np.round(axis.ravel() / _SAME) * _SAME for axis in scan.positions]
+    seen = np.isfinite(u)
+    used: BoolArray = seen.any(axis=1)
+    if scan.used is not None:
+        used &= scan.used
+    # A press is one of all sensors.
+    kept = seen[used].all(axis=0)
+    u = np.where(used[:, None], u, 0.0)[:, kept]
+    places = [np.round(axis.ravel()[kept] / _SAME) * _SAME for axis in scan.positions]
     (x, i), (y, j) = (np.unique(axis, return_inverse=True) for axis in places)
     node = i * y.size + j
     counts = np.bincount(node, minlength=x.size * y.size)
@@ -41,26 +53,36 @@ def measured_array(scan: Scan) -> SensorArray:
     mean = floats(sums) / counts
     away = u - mean[:, node]
     noise = away @ away.T / (u.shape[1] - counts.size)
-    maps = []
-    errors = []
-    for row, variance in zip(mean, np.diag(noise), strict=True):
-        misfit = variance * np.sum(1 / counts)
-        spline = RectBivariateSpline(x, y, row.reshape(x.size, y.size), s=misfit)
-        maps.append(spline(x, y).ravel())
-        errors.append(np.sqrt(variance * spline.get_coeffs().size / u.shape[1]))
     n = len(u)
+    size = np.ptp(mean, axis=1)
+    used &= size > _ALIVE * np.sqrt(np.diag(noise))
+    predicted = np.full_like(mean, np.nan)
+    root = np.zeros((3 * n, 1))
+    for one in np.flatnonzero(used).tolist():
+        variance = float(noise[one, one])
+        field = mean[one].reshape(x.size, y.size)
+        spline = RectBivariateSpline(x, y, field, s=variance * np.sum(1 / counts))
+        predicted[one] = spline(x, y).ravel()
+        root[one] = np.sqrt(variance * spline.get_coeffs().size / u.shape[1])
     at_x, at_y = (floats(grid.ravel()) for grid in np.meshgrid(x, y, indexing="ij"))
-    predicted = floats(maps)
+    rim = np.isin(at_x, x[[0, -1]]) | np.isin(at_y, y[[0, -1]])
+    offset = used & (abs(np.median(mean[:, rim], axis=1)) > _OFFSET * size)
+    messages = []
+    for name, which, words in (
+        ("dead_taxels", ~used, "Dead and left out: "),
+        ("baseline", offset, "Not zero around the raster, and taken for the field: tare "),
+    ):
+        if which.any():
+            names = ", ".join(np.array(scan.sensors)[which])
+            messages.append(Message(name, f"{words}{names}.", "warning"))
     top = np.abs(predicted).argmax(axis=1)
     unknown = np.full(n, np.nan)
-    root = np.zeros((3 * n, 1))
-    root[:n, 0] = errors
     nothing = np.zeros_like(predicted)
     return SensorArray(
         sensors=scan.sensors,
-        used=np.ones(n, bool),
+        used=used,
         conversion_constants=unknown,
-        centres=np.stack([at_x[top], at_y[top]], axis=1),
+        centres=np.where(used, [at_x[top], at_y[top]], np.nan).T,
         crosstalk=np.eye(n),
         estimated=np.zeros((n, n), bool),
         gaussian_sigmas=unknown,
@@ -80,5 +102,5 @@ def measured_array(scan: Scan) -> SensorArray:
         reading_low=scan.reading_low,
         reading_high=scan.reading_high,
         reading=scan.reading,
-        process=Process.of_now(input_scan=scan.source),
+        process=Process.of_now(messages=tuple(messages), input_scan=scan.source),
     )

@@ -38,8 +38,8 @@ class MeasuredFields:
 
     @property
     def sensors(self) -> Any:
-        """Numbers of the sensors."""
-        return np.arange(len(self.array.sensors))
+        """Numbers of the sensors that are used."""
+        return np.flatnonzero(self.array.used)
 
     @property
     def centres(self) -> FloatArray:
@@ -56,7 +56,7 @@ class MeasuredFields:
         from scipy.interpolate import RectBivariateSpline
 
         x, y = self.nodes
-        maps = self.array.readings.predicted.reshape(-1, x.size, y.size)
+        maps = self.array.readings.predicted[self.sensors].reshape(-1, x.size, y.size)
         return [RectBivariateSpline(x, y, one) for one in maps]
 
     def radius(self, force: FloatArray) -> FloatArray:
@@ -79,4 +79,4 @@ class MeasuredFields:
 
     def errors(self, _: FloatArray, force: FloatArray, *__: Any) -> FloatArray:
         """Changes of the readings by one u of each map, (m, n, n)."""
-        return floats(force[:, None, None] * np.diag(self.array.root[: self.sensors.size, 0]))
+        return floats(force[:, None, None] * np.diag(self.array.root[self.sensors, 0]))

@@ -39,9 +39,10 @@ def _numbers(array: SensorArray) -> Values:
 def answer(result: Any) -> str:
     """Return how many sensors are used, how well A and crosstalk are known, and what failed."""
     array = array_of(result)
-    if array.kernel == "measured":
-        return f"Fields of {len(array.sensors)} sensors as measured: places, without pascals."
     used = array.used
+    if array.kernel == "measured":
+        fields = f"Fields of {used.sum()} sensors as measured: places, without pascals."
+        return "\n".join([fields, *texts_of(array.messages)])
     a = _numbers(array)["conversion_constant"]
     values, errors = np.array([a["value"], a["standard_uncertainty"]], float)[:, used]
     middle = format_measured(np.median(values), np.median(errors), a["unit"])

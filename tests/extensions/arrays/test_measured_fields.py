@@ -17,11 +17,16 @@ def fields(at):
     return 1e-4 * (2 - r**2) / (1 + r**2) ** 2.5
 
 
-def raster(rng, repeats=4):
+def raster(rng, repeats=4, offset=0.0, dead=None, missing=None):
     axis = STEP * np.arange(-12, 13)
     x, y = (grid.ravel() for grid in np.meshgrid(axis, axis))
     at = np.tile(np.stack([x, y], axis=1), (repeats, 1))
     u = fields(at) + NOISE * rng.normal(size=(len(at), 5))
+    u += offset
+    if dead is not None:
+        u[:, 2] = dead * rng.normal(size=len(u))
+    if missing is not None:
+        u[missing, 3] = np.nan
     repeat = np.repeat(np.arange(repeats), x.size)
     return memscal.Scan(sensors=NAMES, x=at[:, 0], y=at[:, 1], u_zz=u.T, repeat=repeat, unit="T")
 
@@ -68,6 +73,33 @@ def test_such_an_array_is_kept_in_a_file_and_drawn(array, tmp_path):
     np.testing.assert_allclose(again.locate(u).x, array.locate(u).x)
     assert len(array.plot().axes) == 4
     assert "5 sensors" in str(array)
+
+
+@pytest.mark.parametrize("noise", [0.0, NOISE])
+def test_a_dead_sensor_is_left_out_and_named(noise, rng, tmp_path):
+    array = memscal.calibrate_array(raster(rng, dead=noise), kernel="measured").array
+    assert array.used.tolist() == [True, True, False, True, True]
+    assert "Dead and left out: B2" in str(array)
+    u = fields(np.array([[2e-3, 1e-3], [-3e-3, 4e-3]]))
+    u[:, 2] = 1.0
+    array.save(tmp_path / "skin.h5")
+    found = memscal.load_array(tmp_path / "skin.h5").locate(u)
+    np.testing.assert_allclose(found.x, [2e-3, -3e-3], atol=0.1e-3)
+    assert found.flags == ("", "")
+
+
+def test_presses_with_a_missing_reading_are_left_out(rng):
+    scan = raster(rng, missing=slice(0, None, 7))
+    array = memscal.calibrate_array(scan, kernel="measured").array
+    found = array.locate(fields(np.array([[2e-3, 1e-3]])))
+    np.testing.assert_allclose(found.x, 2e-3, atol=0.1e-3)
+    assert not array.messages
+
+
+def test_an_offset_of_the_readings_is_said(rng):
+    """Taken for the field it made a press of 2 units a misfit of 1."""
+    calibration = memscal.calibrate_array(raster(rng, offset=1e-4), kernel="measured")
+    assert "tare B0, B1, B2, B3, B4" in str(calibration)
 
 
 def test_a_raster_without_repeats_is_refused(rng):
