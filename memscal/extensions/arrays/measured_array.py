@@ -31,8 +31,8 @@ def measured_array(scan: Scan) -> SensorArray:
     from scipy.interpolate import RectBivariateSpline
 
     u = scan.u_zz.reshape(len(scan.sensors), -1)
-    seen = np.isfinite(u)
-    used: BoolArray = seen.any(axis=1)
+    seen: BoolArray = np.isfinite(u)
+    used: BoolArray = np.logical_or.reduce(seen, axis=1)
     if scan.used is not None:
         used &= scan.used
     # A press is one of all sensors.
