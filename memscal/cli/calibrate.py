@@ -291,7 +291,7 @@ def command(
     shared, and each scan has its own centre and baseline.
 
     The scan of an array of sensors is calibrated as an array: A of each sensor, what it reads of
-    its neighbours (crosstalk), places, and the shape of G.
+    its neighbours (crosstalk), places, and the shape of G; without --brief and --dry-run.
 
     A failed quality check is exit code 1: the artifact is written and states it.
     """

@@ -181,7 +181,8 @@ _NAMED = 12
 )
 @option("--layout", FILE)(
     "Scan of an array: table of where its sensors are, with the columns sensor, x and y (and "
-    "x_errors, y_errors), units in the heads, and one row for each sensor."
+    "x_errors, y_errors, and board, the number of shared electronics), units in the heads, and one "
+    "row for each sensor."
 )
 @option("--u-unit --unit u_unit", "UNIT")(
     "Scan: unit of the readings, of any kind, such as mV, pA, uT, Pa, or 1 of counts.  [default: "

@@ -92,6 +92,7 @@ HOOKS = {
     "calibrate_array_file": "extensions.arrays.calibrate_command",
     "array_scan": "extensions.arrays.import_array",
     "columns_of_array": "extensions.arrays.import_array",
+    "errors_of_sensors": "extensions.arrays.import_array",
     "drawn_as": "figures.style",
     "html_image": "figures.report",
     "html_report": "figures.report",

@@ -128,7 +128,7 @@ array_chi_square: residuals of the worst sensor against the noise
 press_errors: what common errors of place and load explain, over chance
     state x_errors, normal_load_errors (--position-error, --load-scatter)
 common_mode: noise that two sensors share against that of their board
-    state boards
+    state boards (in the layout table)
 """
 _ENTRIES = re.findall(r"(\w+): (.*)\n +(.*)\n", _EXPLAINED)
 EXPLANATIONS: dict[str, tuple[str, str]] = {name: (tests, cure) for name, tests, cure in _ENTRIES}

@@ -530,12 +530,13 @@ class Scan:
         u_zz = frozen_array(self.u_zz)
         if len({*names, ""}) <= number or u_zz.shape[:1] != (number,) or self.channels:
             raise InputError(
-                f"The sensors of the scan are {self.sensors!r}, u_zz has shape {u_zz.shape}, and "
-                f"further channels are: {', '.join(self.channels) or 'none'}.",
-                why="The first axis of the readings of an array is the sensor.",
-                cure="Give a list of names, one for each sensor, all different and none empty, and "
-                "further channels as sensors of their own. A single sensor has no layout, board or "
-                "range.",
+                f"The scan names these sensors: {', '.join(names) or 'none'}; u_zz has shape "
+                f"{u_zz.shape}, and further channels are: {', '.join(self.channels) or 'none'}.",
+                why="The first axis of the readings of an array is the sensor. A single sensor has "
+                "no layout, board or range.",
+                cure="Give a list of names, one for each sensor (--u of each), all different and "
+                "none empty, and further channels as sensors of their own; or leave layout "
+                "(--layout), board and range out.",
             )
         own: Values = {"sensors": names, "sensor": self.sensor, "u_zz": u_zz}
         shapes: Values = {"u_zz_errors": u_zz.shape, **dict.fromkeys(OF_SENSORS, (number,))}
@@ -548,7 +549,8 @@ class Scan:
             whole = values.shape == shape and np.isfinite(values).all()
             if values.shape != shape[: values.ndim] or (name == "layout" and not whole):
                 raise InputError(
-                    f"{name} of the scan has shape {values.shape}, but it should be {shape}.",
+                    f"{name} of the scan has shape {values.shape} and "
+                    f"{np.isfinite(values).sum()} finite values, but it should be {shape}.",
                     why=f"There are {number} sensors.",
                     cure="Give finite values of that shape, or leave it out.",
                 )

@@ -60,7 +60,7 @@ def find_holds(
     load = columns.get("normal_load")
     if u.size < _FEWEST:
         raise InputError(f"The log has {counted(u.size, 'rows')} without gaps.", cure=_CURE)
-    position = columns["x"] + 1j * columns.get("y", np.zeros(u.size))
+    position = columns["x"] + 1j * columns.get("y", 0.0)
     way = np.hypot(np.ptp(position.real), np.ptp(position.imag))
     moves = np.abs(np.diff(position)) > _MOVING * way
     dwell = np.append(0, np.cumsum(moves))
@@ -92,17 +92,7 @@ def find_holds(
         before = _before_each(columns, line, held, waiting, dwell)
         notes.append("The mean of the rows before its press is subtracted from each hold.")
     holds = _averaged(columns, line, held, before, len(runs) - len(held), reading, notes)
-    errors = {"u_zz_errors": holds.u_errors}
-    for name in columns:
-        if " of " in name:
-            one = _averaged({"u_zz": columns[name]}, line, held, before, 0, reading, [])
-            errors[name.replace("u_zz", "u_zz_errors")] = one.u_errors
-    every = np.array([*errors.values()])
-    # The sum of an array scatters as no sensor does.
-    errors["u_zz_errors"] = np.nanmedian(every[len(every) > 1 :], axis=0)
-    # Readings of few digits may not scatter.
-    mean = {**holds.mean, **(errors if every.all() else {})}
-    return replace(holds, mean=mean, highest=highest, ceiling=ceiling)
+    return replace(holds, highest=highest, ceiling=ceiling)
 
 
 def _averaged(
@@ -124,6 +114,10 @@ def _averaged(
     }
     for name in mean.keys() & {"repeat", "branch"}:
         mean[name] = columns[name][first]
+    for name in columns:
+        if " of " in name:  # a sensor of an array
+            one = _averaged({"u_zz": columns[name]}, line, held, before, 0, reading, [])
+            mean[name.replace("u_zz", "u_zz_errors")] = one.u_errors
 
     residuals = [u[run] - u[run].mean() for run in held]
     scatter = np.array([np.std(residual, ddof=1) for residual in residuals])
@@ -133,13 +127,12 @@ def _averaged(
     power = sum(residual @ residual for residual in residuals) or 1.0
     neighbours = sum(residual[1:] @ residual[:-1] for residual in residuals)
     correlation = np.clip(neighbours / power + 1 / np.median(size), 0.0, 0.95)
-    errors = noise * np.sqrt((1 + correlation) / (1 - correlation)) / np.sqrt(size)
+    errors = noise * np.sqrt((1 + correlation) / (1 - correlation) / size)
     if before is not None:
         errors = errors * np.sqrt(1 + size / before)
 
-    thirds = [run.size // 3 for run in held]
     change = np.array(
-        [u[run[-n:]].mean() - u[run[:n]].mean() for run, n in zip(held, thirds, strict=True)]
+        [u[run[-(run.size // 3) :]].mean() - u[run[: run.size // 3]].mean() for run in held]
     )
     averaged = (
         f"{counted(len(held), 'holds')} of {size.min()} to {size.max()} rows, the first in lines "

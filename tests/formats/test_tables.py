@@ -119,7 +119,11 @@ NO_UNITS = {"x_unit": None, "u_unit": None}
         (f"x [mm],u/V{ROWS}", {"u_unit": "parsnip"}, "'V', but u_unit"),
         (f"x,u [channel 1]{ROWS}", {"u_unit": None}, "states no unit that is known"),
         ("x,u\n0,1\n1,3\n", {"branch": "u"}, r"table\.csv: column 'u' holds 3"),
-        ("x,u,b\n0,1,down\n1,2,up\n", {"branch": "b"}, r"approach or retreat in line 2 \('down'"),
+        (
+            "x,u,b\n0,1,down\n1,2,up\n",
+            {"branch": "b"},
+            r"none of approach, retreat, in line 2 \('down'",
+        ),
         (
             FORCES,
             {"load": 0.5, "load_column": "f"},

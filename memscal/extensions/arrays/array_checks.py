@@ -311,7 +311,8 @@ def _common_mode(fit: JointFit) -> Failing:
             limit,
             "Largest difference of the noise that two sensors have in common from that of their "
             "board, in standard deviations. A failure means that some share more: state their "
-            "boards, or look for presses that are wrong for several.",
+            "boards (a column board of the layout table), or look for presses that are wrong for "
+            "several.",
         ),
         np.flatnonzero(z.max(axis=1) > limit),
     )

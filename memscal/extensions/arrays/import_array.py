@@ -1,7 +1,7 @@
 """What the import of a table of an array does beyond that of a single sensor's."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import chain
 from typing import Any
@@ -15,29 +15,35 @@ from memscal.formats.tables.scan import ImportedScan
 from memscal.formats.tables.sheets import open_table
 from memscal.formats.tables.stated import TableLayout
 from memscal.formats.units import to_si
-from memscal.model.arrays import Columns, Values
+from memscal.model.arrays import Columns, FloatArray, Values
 from memscal.model.scan import Scan
 
 #: Begins the names of the readings of each sensor, of which ``u_zz`` is the sum.
 _OF = "u_zz of "
+_ERRORS = "u_zz_errors of "
 
 
-def columns_of_array(table: NamedColumns, asked: Sequence[str | int]) -> dict[str, str]:
-    """Return the columns of the sensors, by the names of their readings; ``*`` is any text."""
+def columns_of_array(
+    table: NamedColumns, asked: Sequence[str | int], named: Mapping[str, str | int | None]
+) -> dict[str, str]:
+    """Return the columns of the sensors, by the names of their readings; ``*`` is any other."""
     heads = table.heads
+    others = [column for name, column in named.items() if column is not None and name != "u_zz"]
+    taken = [table.index_of(column) for column in others]
     numbers: list[int] = []
     for column in asked:
         pattern = re.escape(str(column)).replace(r"\*", ".+")
         found = [i for i, head in enumerate(heads) if re.fullmatch(pattern, head)]
+        found = [i for i in found if i not in taken]
         numbers += found if "*" in str(column) and found else [table.index_of(column)]
-    named = {_OF + heads[i]: table.names[i] for i in numbers}
-    if len(named) < len(numbers):
+    sensors = {_OF + heads[i]: table.names[i] for i in numbers}
+    if len(sensors) < len(numbers):
         raise InputError(
             f"The columns of the sensors are {', '.join(heads[i] for i in numbers)}.",
             why="The name of a sensor is the head of its column, and tells it from the others.",
             cure="Name each column once (--u), and rename columns of the same name.",
         )
-    return {"u_zz": table.names[numbers[0]], **(named if len(named) > 1 else {})}
+    return {"u_zz": table.names[numbers[0]], **(sensors if len(sensors) > 1 else {})}
 
 
 def add_up(columns: Columns, layout: TableLayout) -> list[str]:
@@ -55,6 +61,15 @@ def add_up(columns: Columns, layout: TableLayout) -> list[str]:
     return notes
 
 
+def errors_of_sensors(columns: Columns) -> FloatArray:
+    """Return the standard uncertainty of a typical sensor in each hold; zero if not all have one.
+
+    The sum scatters as no sensor does.
+    """
+    errors = [columns[name] for name in columns if name.startswith(_ERRORS)]
+    return np.nanmedian(errors, axis=0) * np.all(errors)
+
+
 def array_scan(
     scan: ImportedScan, layout: Any, ceiling: float | None, of: Wanted
 ) -> tuple[ImportedScan, Scan]:
@@ -66,8 +81,8 @@ def array_scan(
     stated: Values = {} if layout is None else read_layout(layout, names)
     if ceiling is not None:  # a calibration leaves out what is there, and says of which sensor
         stated["reading_high"] = to_si(ceiling, of.unit, of.dimension, "ceiling (--ceiling)")
+    own = [channels.pop(name) for name in scan.channels if name.startswith(_ERRORS)]
     if scan.u_zz_errors is not None:  # of holds each sensor has its own
-        own = [channels.pop(name) for name in scan.channels if name.startswith("u_zz_errors")]
         stated["u_zz_errors"] = np.broadcast_to(own or [scan.u_zz_errors], u_zz.shape)
     array = replace(scan, u_zz=u_zz, channels=channels, sensors=tuple(names), **stated)
     most = int(np.nan_to_num(u_zz).argmax()) // scan.u_zz.size
@@ -87,6 +102,8 @@ def read_layout(source: Any, sensors: Sequence[str]) -> Values:
     wanted = {"sensor": Wanted("sensor", words=words)}
     for name in chain(*fields.values()):
         wanted[name] = Wanted(name, table.unit_of(name, None, "x [mm]"), "length")
+    if "board" in table.heads:
+        wanted["board"] = Wanted("board")
     columns = table.columns(wanted)
     found = columns["sensor"].tolist()
     if sorted(found) != sorted(keys):
@@ -97,7 +114,8 @@ def read_layout(source: Any, sensors: Sequence[str]) -> Values:
             cure="Give each sensor one row, and no other.",
         )
     order = [found.index(key) for key in keys]
-    return {
+    stated: Values = {
         field: np.column_stack([columns[name] for name in names])[order]
         for field, names in fields.items()
     }
+    return {"board": columns["board"][order], **stated} if "board" in columns else stated

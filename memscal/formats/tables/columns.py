@@ -293,9 +293,10 @@ class NamedColumns:
                 continue
             named = ", ".join(f"{i} ({cell!r})" for i, cell in zip(lines, cells, strict=False))
             why = next((text for test, text in _CAUSES if any(map(test, cells))), "")
+            words = f", and none of {', '.join(item.words)}," if item.words else ""
             raise FormatError(
-                f"{self.where(item.column)} holds what is not "
-                f"{' or '.join(['a number', *item.words])} in {self._row} {named}{_more(lines)}.",
+                f"{self.where(item.column)} holds what is not a number{words} in "
+                f"{self._row} {named}{_more(lines)}.",
                 why=why,
                 cure="Correct or remove these lines; name a word that means a missing value "
                 "(--missing WORD); state the decimal mark (--decimal); or state how many lines "

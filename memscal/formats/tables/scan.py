@@ -179,7 +179,7 @@ def import_table(
     table = open_table(source, asked, **{name: getattr(layout, name) for name in _READING})
     named |= table.defaults
     if len(readings) > 1 or "*" in str(u):
-        named |= hook("columns_of_array")(table, readings)
+        named |= hook("columns_of_array")(table, readings, named)
     array = any(" of " in name for name in named)
     _require_use(named, layout, conditions, uncertainties)
     wanted, reading = _wanted(table, named, layout)
@@ -192,12 +192,15 @@ def import_table(
     holds = None
     if layout.holds:
         deep = columns.pop("depth", None)
-        anew = layout.baseline is not None
+        anew = bool(layout.baseline)
         holds = find_holds(columns, table.all_lines(), reading, depth=deep, baseline=anew)
         if presses is not None:
             hook("require_all_held")(holds, presses)
         notes += holds.notes
         columns = dict(holds.mean)
+        errors = hook("errors_of_sensors")(columns) if array else holds.u_errors
+        if errors.all():  # readings of few digits may not scatter
+            columns["u_zz_errors"] = errors
     of = wanted["u_zz"]
     ceiling = None if array else layout.ceiling
     clipped = _leave_out_clipped(columns, holds, ceiling, of, reading, notes)

@@ -49,9 +49,9 @@ def test_columns_become_sensors_in_their_order_with_their_places(run):
         (["u_A", "u_*"], LAYOUT, "u_A, u_A"),
         (["u_A", "v*"], LAYOUT, "'v.*'"),
         ("u_*", LAYOUT.replace("u_B,", "u_A,"), "exactly once"),
-        ("u_*", LAYOUT.replace("u_B,", "u_D,"), "'u_D'"),
-        ("u_*", LAYOUT.replace("-4,", ","), "finite"),
-        ("u_A", LAYOUT, "single sensor has no layout"),
+        ("u_*", LAYOUT.replace("u_B,", "u_D,"), "none of u_a, u_c, u_b, in line 2 .'u_D'"),
+        ("u_*", LAYOUT.replace("-4,", ","), "5 finite values"),
+        ("u_A", LAYOUT, "names these sensors: none; .*\n.*single sensor has no layout"),
     ],
 )
 def test_what_is_no_array_or_not_its_layout_is_refused(u, layout, words):
@@ -60,11 +60,12 @@ def test_what_is_no_array_or_not_its_layout_is_refused(u, layout, words):
         import_table("row.csv", x="x", u=u, conditions=PLACED)
 
 
-def test_names_that_are_numbers_are_matched_as_numbers():
-    Path("layout.csv").write_text("sensor,x [mm],y [mm]\n10,4,0\n2,1,0\n")
+def test_all_other_columns_are_sensors_and_their_numbers_are_matched_as_numbers():
+    Path("layout.csv").write_text("sensor,x [mm],y [mm],board\n10,4,0,2\n2,1,0,1\n")
     table = {"x [mm]": [0, 1], "2 [mV]": [0, 1], "10 [mV]": [1, 0]}
-    scan = import_table(table, x="x", u=["2", "10"], conditions=PLACED)
+    scan = import_table(table, x="x", u="*", conditions=PLACED)
     assert scan.sensors == ("2", "10")
+    np.testing.assert_array_equal(scan.board, [1, 2])
     np.testing.assert_allclose(scan.layout[:, 0], [1e-3, 4e-3])
 
 
