@@ -24,11 +24,8 @@ def bound(
     require_positive("The least force", np.min(force), "N")
     seeking = replace(Seeking.on(array, indenter, shear), near=np.inf)
     residual, slopes = seeking.rows(np.zeros(1), states(places, force, 0.0))
-    told = slopes[..., 0].any(axis=1)
-    bounds = np.full((len(slopes), 3, 3), np.nan)
-    _, inverse = steps(residual[told], slopes[told])
-    bounds[told] = seeking.covariance(inverse)
-    return bounds
+    _, inverse = steps(residual, slopes)
+    return seeking.covariance(inverse)
 
 
 def predict(

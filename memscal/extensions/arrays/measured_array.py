@@ -67,14 +67,9 @@ def measured_array(scan: Scan) -> SensorArray:
     at_x, at_y = (floats(grid.ravel()) for grid in np.meshgrid(x, y, indexing="ij"))
     rim = np.isin(at_x, x[[0, -1]]) | np.isin(at_y, y[[0, -1]])
     offset = used & (abs(np.median(mean[:, rim], axis=1)) > _OFFSET * size)
-    messages = []
-    for name, which, words in (
-        ("dead_taxels", ~used, "Dead and left out: "),
-        ("baseline", offset, "Not zero around the raster, and taken for the field: tare "),
-    ):
-        if which.any():
-            names = ", ".join(np.array(scan.sensors)[which])
-            messages.append(Message(name, f"{words}{names}.", "warning"))
+    names = ", ".join(np.array(scan.sensors)[offset])
+    text = f"Not zero around the raster, which is taken for the field: tare {names}."
+    messages = (Message("baseline", text, "warning"),) if names else ()
     top = np.abs(predicted).argmax(axis=1)
     unknown = np.full(n, np.nan)
     nothing = np.zeros_like(predicted)
@@ -102,5 +97,5 @@ def measured_array(scan: Scan) -> SensorArray:
         reading_low=scan.reading_low,
         reading_high=scan.reading_high,
         reading=scan.reading,
-        process=Process.of_now(messages=tuple(messages), input_scan=scan.source),
+        process=Process.of_now(messages=messages, input_scan=scan.source),
     )

@@ -49,8 +49,6 @@ _LOADS = np.geomspace(1 / 64, 16.0, 21)
 #: A film of another law than a linear one is known to so many depths of the scan's rod: at two the
 #: stress per newton is 4 % off.
 _DEEPEST = 1.5
-#: Share by which a force is changed for the derivative of the stress per newton by it.
-_GROWN = 1e-3
 #: A radius in place of zero, as a share of the tables' step.
 _AXIS = 1e-6
 
@@ -99,11 +97,9 @@ class ReceptiveFields:
     def forward(self, places: FloatArray, force: FloatArray, shear: FloatArray) -> ArrayPair:
         """Readings (m, n), and their derivatives by x, y, force and the two shears, (m, n, 5)."""
         slopes = self.mixing @ self._sources(places, force, shear)
-        more = self.mixing @ self._sources(places, (1 + _GROWN) * force, shear)
-        value = slopes[..., 2].copy()
-        slopes[..., 2] += (more[..., 2] - value) / _GROWN
         slopes[..., [0, 1, 3, 4]] *= force[:, None, None]
-        return force[:, None] * value, slopes
+        # How the stress per newton changes with the force is left out of its derivative.
+        return force[:, None] * slopes[..., 2], slopes
 
     def errors(self, places: FloatArray, force: FloatArray, shear: FloatArray) -> FloatArray:
         """Changes of the readings by one u of each independent error of the array, (m, n, c)."""
@@ -143,7 +139,7 @@ class ReceptiveFields:
         loads, kernels, radii, columns = self.profiles.shape
         table = self.profiles.reshape(-1, columns)
         apart = np.sqrt(np.einsum("mnk,mnk->mn", offsets, offsets)) / self.radii[1]
-        apart = np.minimum(apart, radii - 1.001)
+        apart = np.minimum(apart, radii - 1 - _AXIS)
         near = apart.astype(np.intp)
         share = (apart - near)[..., None]
         near += radii * (np.arange(self.sensors.size) % kernels)
@@ -173,7 +169,10 @@ def receptive_fields(array: ArrayData, indenter: RoundIndenter | None = None) ->
     at = np.minimum(nodes.k, array.k[-1])
     kernels = radial_spline(array.k, kernels.T)(at).T
     set_up = SetUp(film, array.indenter, array.load, None)
-    contacts = _contacts(set_up, indenter)
+    linear_film = film.law == LINEAR
+    depth = indent(film, array.indenter, load=array.load, strain="linear").depth
+    deepest = np.inf if linear_film else _DEEPEST * depth
+    contacts = _contacts(set_up, indenter, deepest)
     loads, depths, contact_radii = floats([[c.load, c.depth, c.contact_radius] for c in contacts]).T
     pressures = np.ones((loads.size, nodes.k.size))
     if indenter is None:
@@ -188,9 +187,7 @@ def receptive_fields(array: ArrayData, indenter: RoundIndenter | None = None) ->
     else:
         of_rod = array.load * radial_spline(array.k, array.reference)(at)
         change = per_pressure(set_up, linear, of_rod - rod_spectrum(set_up, linear, LINEAR))
-    share = np.ones(loads.size)
-    if film.law != LINEAR:
-        share = depths / indent(film, array.indenter, load=array.load, strain="linear").depth
+    share = np.where(linear_film, 1.0, depths / depth)
     transfers = by_pressure + share[:, None] * change
 
     spectra = ((pressures * transfers)[:, None] * kernels).reshape(-1, nodes.k.size).T
@@ -207,7 +204,7 @@ def receptive_fields(array: ArrayData, indenter: RoundIndenter | None = None) ->
         ]
     )
     # Beyond the tables there is nothing.
-    columns[:, -2:] = 0.0
+    columns[:, -1] = 0.0
     shape = (loads.size, len(kernels), radii.size, len(columns))
 
     # What is uncertain is taken at the middle load, and of the mean kernel.
@@ -234,15 +231,12 @@ def receptive_fields(array: ArrayData, indenter: RoundIndenter | None = None) ->
     )
 
 
-def _contacts(set_up: SetUp, indenter: RoundIndenter | None) -> list[Contact]:
-    """Press an indenter, or the scan's rod, on a linear film, as deep as it goes."""
+def _contacts(set_up: SetUp, indenter: RoundIndenter | None, deepest: float) -> list[Contact]:
+    """Press an indenter, or the scan's rod, on a linear film, as deep as it goes or is asked."""
     film, rod, load, _ = set_up
     pressed = indenter or rod
     # Where nothing changes with the load one table serves them all.
     constant = film.law == LINEAR and isinstance(pressed, Rod)
-    deepest = np.inf
-    if film.law != LINEAR:
-        deepest = _DEEPEST * indent(film, rod, load=load, strain="linear").depth
     contacts: list[Contact] = []
     for factor in [1.0] if constant else _LOADS:
         try:

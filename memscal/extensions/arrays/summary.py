@@ -40,14 +40,14 @@ def answer(result: Any) -> str:
     """Return how many sensors are used, how well A and crosstalk are known, and what failed."""
     array = array_of(result)
     used = array.used
+    lost = np.array(array.sensors)[~used].tolist()
+    left_out = f"; left out: {_listed(lost)}" if lost else ""
     if array.kernel == "measured":
-        fields = f"Fields of {used.sum()} sensors as measured: places, without pascals."
+        fields = f"Fields of {used.sum()} sensors as measured{left_out}: places, without pascals."
         return "\n".join([fields, *texts_of(array.messages)])
     a = _numbers(array)["conversion_constant"]
     values, errors = np.array([a["value"], a["standard_uncertainty"]], float)[:, used]
     middle = format_measured(np.median(values), np.median(errors), a["unit"])
-    lost = np.array(array.sensors)[~used].tolist()
-    left_out = f"; left out: {_listed(lost)}" if lost else ""
     lines = [
         f"{used.sum()} of {used.size} sensors are used{left_out}.",
         f"A = {middle} at the median; it scatters by {percent(np.std(values) / np.mean(values))}.",
