@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from memscal.errors import FormatError
 from memscal.extensions.arrays.array_data import RADII, ArrayData, ArrayReadings, KernelModes
 from memscal.formats import groups
 from memscal.formats.digest import require_schema, require_unaltered
@@ -97,7 +98,7 @@ def read_open(file: SafeFile) -> ArrayData:
         read |= read_record(of.read_in(reading), file, path, sizes=sizes)
     columns = np.vstack([read[part] for part in _PARTS])
     opened = columns.shape[1] - len(read["inputs"])
-    if "layout_x" in read:
+    if {"layout_x", "layout_y"} <= read.keys():
         read["layout"] = np.column_stack([read["layout_x"], read["layout_y"]])
     film, indenter = groups.read_stated(file)
     read |= {
@@ -118,4 +119,14 @@ def read_open(file: SafeFile) -> ArrayData:
         "checks": groups.read_quality(file),
         "process": groups.read_process(file),
     }
-    return ArrayData(**{n: read[n] for n in read.keys() & ArrayData.__dataclass_fields__.keys()})
+    data = ArrayData(**{n: read[n] for n in read.keys() & ArrayData.__dataclass_fields__.keys()})
+    # A line tells one of x and y of each sensor, and of none the other one.
+    told = np.isfinite(data.centres[data.used])
+    kernel = np.fmax.reduce(data.kernels)
+    numbers = np.vstack([data.k, kernel, data.modes.changes, read.get("reference", 0.0 * kernel)])
+    if not np.isfinite(numbers).all() or len(np.unique(told, axis=0)) != 1:
+        raise FormatError(
+            f"{file.name} has kernels or centres that are not finite, or no sensor is used.",
+            cure="Calibrate the array again.",
+        )
+    return data

@@ -85,6 +85,34 @@ def test_a_changed_file_is_refused_or_accepted_on_record(tmp_path):
     assert "digest" in found.source.altered
 
 
+@pytest.mark.parametrize(
+    "path",
+    [
+        "kernel/k",
+        "kernel/transfer",
+        "kernel/changes",
+        "kernel/reference",
+        "sensors/centre_x",
+        "sensors/used",
+    ],
+)
+def test_an_altered_file_with_numbers_that_are_none_is_refused(path, tmp_path):
+    file = tmp_path / "array.h5"
+    full_array().save(file)
+    with h5py.File(file, "a") as altered:
+        which = slice(None) if path == "sensors/used" else 0
+        altered[f"entry/{path}"][..., which] = np.nan
+    with pytest.raises(FormatError, match="not finite"):
+        memscal.load_array(file, accept_altered=True)
+
+
+def test_half_a_layout_is_none(tmp_path):
+    full_array().save(tmp_path / "array.h5")
+    with h5py.File(tmp_path / "array.h5", "a") as altered:
+        del altered["entry/sensors/layout_y"]
+    assert memscal.load_array(tmp_path / "array.h5", accept_altered=True).layout is None
+
+
 def test_a_raster_of_many_sensors_stays_small(tmp_path):
     full_array(8, 8, points=4225).save(tmp_path / "array.h5")
     # Three arrays of 64 x 4225 readings, of which noise does not shrink.
