@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 from scipy.special import chdtrc, chdtri, ndtr, ndtri
@@ -319,7 +319,11 @@ def _common_mode(fit: JointFit) -> Failing:
 
 
 def array_messages(
-    scan: Scan, prepared: Prepared, found: Sorted, fit: JointFit
+    scan: Scan,
+    prepared: Prepared,
+    found: Sorted,
+    fit: JointFit,
+    failing: Mapping[str, Sequence[str]],
 ) -> Iterator[Message]:
     """Yield what a user has to know beside the checks."""
     yield from override_messages(prepared.overridden)
@@ -328,7 +332,7 @@ def array_messages(
         yield Message("dead_taxels", f"Dead and left out: {names}.", "warning")
     numbers = fit.model.layout.crosstalk
     places = numbers[numbers >= 0]
-    if places.size:
+    if places.size and not failing.get("crosstalk_identified"):
         values = fit.state.crosstalk[numbers >= 0]
         # Alike for all pairs it is seen by its mean; of a single pair by the whole.
         of_mean = np.linalg.norm(fit.posterior.root[places].mean(axis=0))

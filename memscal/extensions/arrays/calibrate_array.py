@@ -192,7 +192,10 @@ def calibrate_array(
         fit, compared = compared, fit
     array = _array(opened, prepared, found, fit)
     checks, failing = array_checks(fit, compared, array, found)
-    messages = [*failed_check_messages(checks), *array_messages(opened, prepared, found, fit)]
+    messages = [
+        *failed_check_messages(checks),
+        *array_messages(opened, prepared, found, fit, failing),
+    ]
     process = Process.of_now(
         configuration={
             "kernel": kernel,

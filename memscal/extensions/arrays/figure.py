@@ -79,7 +79,9 @@ def _draw_places(axes: Axes, array: SensorArray) -> None:
         axes.plot(*array.layout[~array.used].T / MM, "x", color=FAILED)
     for i in np.flatnonzero(array.used) if a.size <= _MOST_NUMBERS else ():
         number = f"{a[i]:.3g}"
-        axes.annotate(number, (x[i], y[i]), (-8, 5), textcoords="offset points", fontsize=6)
+        axes.annotate(
+            number, (x[i], y[i]), (-3, 4), textcoords="offset points", fontsize=6, rotation=45
+        )
     axes.set_aspect("equal", adjustable="datalim")
     axes.set(xlabel="x (mm)", ylabel="y (mm)")
 
@@ -102,6 +104,9 @@ def _draw_matrix(
     image = axes.imshow(values, cmap="RdBu_r", vmin=-limit, vmax=limit, interpolation="nearest")
     axes.figure.colorbar(image, ax=axes, label=label)
     _name_rows(axes, array)
+    axes.set_xlabel("sensor")
+    if len(values.T) == len(values) <= _MOST_NUMBERS:
+        axes.set_xticks(range(len(values)), map(drawable, array.sensors), rotation=90)
 
 
 def _name_rows(axes: Axes, array: SensorArray) -> None:

@@ -70,18 +70,19 @@ def _crosstalk_text(array: SensorArray) -> str:
     found = array.estimated
     if not found.any():
         return "No crosstalk was estimated."
-    u = percent(np.median(array.crosstalk_uncertainties[found]))
     if identified(array):
+        u = percent(np.median(array.crosstalk_uncertainties[found]))
         return (
             f"Crosstalk is {percent(array.crosstalk[found].mean())} on the mean, u of a pair {u}."
         )
+    check, *_ = (check for check in array.checks if check.name == "crosstalk_identified")
     places = array.places
     apart = np.hypot(*(places[:, None] - places).T)
     pitch = apart[found].min() / array.film.thickness
     return (
-        f"Crosstalk is not identified (u {u}): with a pitch of {pitch:.2g} thicknesses of the film "
-        "it looks like another shape of G. Scan a raster, or take a thinner film; A has the u that "
-        "this costs."
+        f"Crosstalk is not identified: its u by the readings alone is {percent(check.value)}, of "
+        f"at most {percent(check.limit)}, with a pitch of {pitch:.2g} thicknesses of the film. "
+        "Mend what else fails, scan a raster, or take a thinner film; A has the u that this costs."
     )
 
 

@@ -51,6 +51,7 @@ def test_crosstalk_is_printed_only_where_it_is_identified(passed):
     assert ("Crosstalk is not identified" in text) != passed
     assert array.to_dict()["crosstalk"]["value"][0][1] == pytest.approx(0.01)
     if not passed:
+        assert "by the readings alone is 2 %, of at most 0.5 %," in text
         assert "1 thicknesses of the film" in text
         assert "raster, or take a thinner film" in text
         assert "What fails crosstalk identified: T00, T01." in text
@@ -78,6 +79,8 @@ def test_figure_and_page_show_the_array(tmp_path, size):
     figure = array.plot()
     labels = [axes.get_label() for axes in figure.axes]
     assert labels[:7] == list("abcdefg")
+    ticks = [[tick.get_text() for tick in figure.axes[i].get_xticklabels()] for i in (1, 6)]
+    assert (ticks == 2 * [list(array.sensors)]) == (size == (1, 3))
     crosstalk = figure.axes[1].images[0].get_array()
     # All grey where it is not identified; only pairs that were estimated elsewhere.
     shown = np.isfinite(np.ma.filled(crosstalk, np.nan))
