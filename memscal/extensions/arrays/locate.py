@@ -61,10 +61,9 @@ _LESS = 0.2
 _MORE = 5.0
 #: Sensors lie on a line if they are apart from it by less of the film's thickness.
 _ON_A_LINE = 0.1
-#: Prior standard deviations of the distance from the sensors' box, in thicknesses, and of ln force,
-#: by which starts are compared: by little noise a huge force far outside is as likely as a contact.
+#: Prior standard deviation of the distance from the sensors' box, in thicknesses: by little noise a
+#: huge force far outside is as likely as a contact.
 _OUTSIDE = 0.5
-_FORCES = 1.5
 #: Forces are above this, in N.
 _LEAST = 1e-9
 
@@ -182,10 +181,7 @@ class Seeking:
             state[better] = trial[better]
             residual[better] = there[better]
             slopes[better] = bent[better]
-        # Of contacts that are as likely the one of a more usual force is taken.
-        unusual = np.log(state[:, 2] / self.fields.array.load) / _FORCES
-        cost = np.sum(residual**2, axis=1) + unusual**2
-        best = cost.reshape(-1, _STARTS).argmin(axis=1)
+        best = np.sum(residual**2, axis=1).reshape(-1, _STARTS).argmin(axis=1)
         return floats(state.reshape(-1, _STARTS, 5)[np.arange(best.size), best])
 
     def judged(self, u: FloatArray, state: FloatArray) -> ArrayTriple:
