@@ -62,7 +62,7 @@ def find_holds(
         raise InputError(f"The log has {counted(u.size, 'rows')} without gaps.", cure=_CURE)
     position = columns["x"] + 1j * columns.get("y", 0.0)
     way = np.hypot(np.ptp(position.real), np.ptp(position.imag))
-    moves = np.abs(np.diff(position)) > _MOVING * way
+    moves = abs(np.diff(position)) > _MOVING * way
     dwell = np.append(0, np.cumsum(moves))
     if depth is not None:
         pressed, waiting = _lowered(u, depth[whole], dwell, notes)
@@ -147,7 +147,7 @@ def _averaged(
     changes = (
         "From the first to the last third of a hold the readings change by "
         f"{reading.text(np.median(change))} (median; at most by "
-        f"{reading.text(np.abs(change).max())})."
+        f"{reading.text(abs(change).max())})."
     )
     log = {name: columns[name] for name in _LOGGED if name in columns}
     return Holds(
@@ -223,7 +223,7 @@ def _before_each(
                 why=f"Before its press it has {rows.size} rows at its place, of {_FEWEST} or more.",
                 cure="Leave out these lines, or baseline (--baseline).",
             )
-        rows = rows[np.abs(u[rows] - np.median(u[rows])) <= near]
+        rows = rows[abs(u[rows] - np.median(u[rows])) <= near]
         size[i] = rows.size
         for name in columns:
             if name.startswith("u_"):
@@ -242,8 +242,8 @@ def _timed(
     time = (np.arange(u.size) - starts[dwell]) / own
     # Short stops on the way are no places, and long waits at some do not tell what is usual.
     usual = np.median(size[4 * size > np.median(own)])
-    spread = _DEVIATIONS * np.median(np.abs(own - usual))
-    alike = np.abs(size - usual) <= max(_FEWEST, _ALIKE * usual, min(spread, usual / 2))
+    spread = _DEVIATIONS * np.median(abs(own - usual))
+    alike = abs(size - usual) <= max(_FEWEST, _ALIKE * usual, min(spread, usual / 2))
     spans = []
     for start, count in zip(starts[alike], size[alike], strict=True):
         rows = slice(start, start + count)
@@ -263,21 +263,21 @@ def _timed(
     waiting = time < np.quantile(begins, 0.1)
     press = (end - begin) * usual
     for i in np.flatnonzero(~alike & ((end - begin) * size >= _FEWEST)):
-        place = np.arange(starts[i], starts[i] + size[i])
-        raised = place[_raised(u[place])]
+        place = np.flatnonzero(dwell == i)
+        held = place[_raised(u[place])]
         which = f"lines {line[place[0]]} to {line[place[-1]]}"
-        if not press / 2 <= raised.size <= 2 * press or np.ptp(raised) > 1.1 * raised.size:
+        if not press / 2 <= held.size <= 2 * press or np.ptp(held) > 1.1 * held.size:
             raise InputError(
                 f"The log does not show when the indenter presses in {which}.",
                 why=f"It rests for {place.size} rows there, at other places for {usual:.0f} "
                 "(median).",
                 cure=f"{_CURE} Or leave these lines out.",
             )
-        pressed[place] = (place >= raised[0]) & (place <= raised[-1])
-        waiting[place] = place < raised[0]
+        pressed[place] = (place >= held[0]) & (place <= held[-1])
+        waiting[place] = place < held[0]
         notes.append(
             f"Of {which}, more or less than at other places, the plateau of lines "
-            f"{line[raised[0]]} to {line[raised[-1]]} is taken: its readings are higher."
+            f"{line[held[0]]} to {line[held[-1]]} is taken: its readings are higher."
         )
     return pressed, waiting
 
@@ -289,7 +289,7 @@ def _raised(u: FloatArray) -> BoolArray:
 
 
 def _noise(values: FloatArray) -> float:
-    return float(np.median(np.abs(np.diff(values)))) * _TO_SIGMA if values.size > 1 else 0.0
+    return float(np.median(abs(np.diff(values)))) * _TO_SIGMA if values.size > 1 else 0.0
 
 
 def _steady_rows(
@@ -303,6 +303,6 @@ def _steady_rows(
             continue
         held = np.quantile(values[run], share)
         near = max(noise, _STEADY * abs(held - lifted))
-        inside = np.flatnonzero(np.abs(values[run] - held) <= near)
+        inside = np.flatnonzero(abs(values[run] - held) <= near)
         steady.append(run[inside[0] : inside[-1] + 1] if inside.size else run[:0])
     return steady
