@@ -58,7 +58,7 @@ def renamed(names):
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        (renamed('["T00", "T01"]'), r"\['T00', 'T01'\], u_zz has shape \(3, 33\)"),
+        (renamed('["T00", "T01"]'), r"sensors: T00, T01; u_zz has shape \(3, 33\)"),
         (lambda data: data.pop("sensor_names"), r"sensor as axis 0(.|\n)*sensor_names"),
         (lambda data: data.pop("layout_y"), "finite"),
         (lambda data: data.attrs.update(axes=["x", "sensor"]), "x as axis 0, sensor as axis 1"),

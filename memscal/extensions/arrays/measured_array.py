@@ -7,7 +7,7 @@ import numpy as np
 from memscal.errors import InputError
 from memscal.extensions.arrays.array_data import ArrayReadings, KernelModes
 from memscal.extensions.arrays.sensor_array import SensorArray
-from memscal.model.arrays import BoolArray, floats
+from memscal.model.arrays import BoolArray, IndexArray, floats
 from memscal.model.checks import Message
 from memscal.model.provenance import Process
 from memscal.model.scan import Scan
@@ -33,8 +33,7 @@ def measured_array(scan: Scan) -> SensorArray:
     u = scan.u_zz.reshape(len(scan.sensors), -1)
     seen: BoolArray = np.isfinite(u)
     used: BoolArray = np.logical_or.reduce(seen, axis=1)
-    if scan.used is not None:
-        used &= scan.used
+    used &= True if scan.used is None else scan.used
     # A press is one of all sensors.
     kept = seen[used].all(axis=0)
     u = np.where(used[:, None], u, 0.0)[:, kept]
@@ -42,15 +41,8 @@ def measured_array(scan: Scan) -> SensorArray:
     (x, i), (y, j) = (np.unique(axis, return_inverse=True) for axis in places)
     node = i * y.size + j
     counts = np.bincount(node, minlength=x.size * y.size)
-    if min(x.size, y.size) < 4 or counts.min() == 0 or counts.max() == 1:
-        raise InputError(
-            f"Of {x.size} x {y.size} places {np.sum(counts > 0)} were pressed, one of them "
-            f"{counts.max()} times.",
-            why="The field of each sensor is measured by a full raster, and its error by repeats.",
-            cure="Press each place of a raster, two times or more.",
-        )
-    sums = [np.bincount(node, row, counts.size) for row in u]
-    mean = floats(sums) / counts
+    _require_raster(x.size, y.size, counts)
+    mean = floats([np.bincount(node, row, counts.size) for row in u]) / counts
     away = u - mean[:, node]
     noise = away @ away.T / (u.shape[1] - counts.size)
     n = len(u)
@@ -66,13 +58,10 @@ def measured_array(scan: Scan) -> SensorArray:
         root[one] = np.sqrt(variance * spline.get_coeffs().size / u.shape[1])
     at_x, at_y = (floats(grid.ravel()) for grid in np.meshgrid(x, y, indexing="ij"))
     rim = np.isin(at_x, x[[0, -1]]) | np.isin(at_y, y[[0, -1]])
-    offset = used & (abs(np.median(mean[:, rim], axis=1)) > _OFFSET * size)
-    names = ", ".join(np.array(scan.sensors)[offset])
-    text = f"Not zero around the raster, which is taken for the field: tare {names}."
-    messages = (Message("baseline", text, "warning"),) if names else ()
+    around = abs(np.median(mean[:, rim], axis=1))
+    messages = _offset(scan, used & (around > _OFFSET * size))
     top = np.abs(predicted).argmax(axis=1)
     unknown = np.full(n, np.nan)
-    nothing = np.zeros_like(predicted)
     return SensorArray(
         sensors=scan.sensors,
         used=used,
@@ -92,10 +81,30 @@ def measured_array(scan: Scan) -> SensorArray:
         film=cast(Any, scan.film),
         indenter=cast(Any, scan.indenter),
         load=1.0,
-        readings=ArrayReadings(at_x, at_y, np.ones(at_x.size), mean, predicted, nothing),
+        readings=ArrayReadings(at_x, at_y, np.ones(at_x.size), mean, predicted, 0 * mean),
         kernel="measured",
         reading_low=scan.reading_low,
         reading_high=scan.reading_high,
         reading=scan.reading,
         process=Process.of_now(messages=messages, input_scan=scan.source),
     )
+
+
+def _require_raster(width: int, height: int, counts: IndexArray) -> None:
+    """Refuse presses of a raster that is not full, or was not repeated."""
+    if min(width, height) < 4 or counts.min() == 0 or counts.max() == 1:
+        raise InputError(
+            f"Of {width} x {height} places {np.sum(counts > 0)} were pressed, one of them "
+            f"{counts.max()} times.",
+            why="The field of each sensor is measured by a full raster, and its error by repeats.",
+            cure="Press each place of a raster, two times or more.",
+        )
+
+
+def _offset(scan: Scan, offset: BoolArray) -> tuple[Message, ...]:
+    """Name the sensors that are not zero around the raster."""
+    if not offset.any():
+        return ()
+    names = ", ".join(np.array(scan.sensors)[offset])
+    text = f"Not zero around the raster, which is taken for the field: tare {names}."
+    return (Message("baseline", text, "warning"),)

@@ -191,20 +191,8 @@ def receptive_fields(array: ArrayData, indenter: RoundIndenter | None = None) ->
     transfers = by_pressure + share[:, None] * change
 
     spectra = ((pressures * transfers)[:, None] * kernels).reshape(-1, nodes.k.size).T
-    falling = -nodes.k[:, None] * spectra
     # A sensor is seen from the contact in the direction opposite to their offset.
-    ratio = -(by_shear / by_pressure)[:, None]
-    r = np.maximum(radii, _AXIS * radii[1])
-    columns = np.array(
-        [
-            nodes.synthesise(spectra, r),
-            nodes.synthesise(falling, r, order=1) / r[:, None],
-            nodes.synthesise(ratio * spectra, r, order=1) / r[:, None],
-            nodes.synthesise(ratio * falling, r, order=2) / r[:, None] ** 2,
-        ]
-    )
-    # Beyond the tables there is nothing.
-    columns[:, -1] = 0.0
+    columns = _by_radius(nodes, radii, spectra, -(by_shear / by_pressure)[:, None])
     shape = (loads.size, len(kernels), radii.size, len(columns))
 
     # What is uncertain is taken at the middle load, and of the mean kernel.
@@ -229,6 +217,25 @@ def receptive_fields(array: ArrayData, indenter: RoundIndenter | None = None) ->
         owner=np.append(array.modes.owner, np.full(len(inputs), ALL)),
         sizes=np.vstack([array.split(array.columns)[4], by_input]),
     )
+
+
+def _by_radius(
+    nodes: Wavenumbers, radii: FloatArray, spectra: FloatArray, ratio: FloatArray
+) -> FloatArray:
+    """Return fields and their slopes over the radius, by pressure and by shear, (4, radii, m)."""
+    falling = -nodes.k[:, None] * spectra
+    r = np.maximum(radii, _AXIS * radii[1])
+    columns = np.array(
+        [
+            nodes.synthesise(spectra, r),
+            nodes.synthesise(falling, r, order=1) / r[:, None],
+            nodes.synthesise(ratio * spectra, r, order=1) / r[:, None],
+            nodes.synthesise(ratio * falling, r, order=2) / r[:, None] ** 2,
+        ]
+    )
+    # Beyond the tables there is nothing.
+    columns[:, -1] = 0.0
+    return columns
 
 
 def _contacts(set_up: SetUp, indenter: RoundIndenter | None, deepest: float) -> list[Contact]:
