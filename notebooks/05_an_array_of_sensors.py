@@ -126,7 +126,15 @@ for what, error, stated, unit in (
     print(f"{what}: error {rms:.1f} rms, stated {u:.1f}")
 
 # %%
-contacts.plot()
+fig, ax = plt.subplots(figsize=(4.6, 3.6))
+ax.plot(*array.centres.T / MM, "s", mfc="none", color="0.6", label="sensors")
+ax.plot(*places.T / MM, "+", color="k", label="truth")
+ax.errorbar(contacts.x / MM, contacts.y / MM, 2 * y / MM, 2 * x / MM, fmt="none", color="0.6")
+drawn = ax.scatter(contacts.x / MM, contacts.y / MM, s=12, c=contacts.force, zorder=3)
+fig.colorbar(drawn, label="force (N)")
+ax.set(aspect="equal", xlabel="x (mm)", ylabel="y (mm)")
+fig.legend(loc="outside upper center", ncols=2)
+plt.show()
 
 # %% [markdown]
 # ## 4. A recorded stream
