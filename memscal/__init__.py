@@ -55,7 +55,7 @@ PUBLIC = {
     "model.field_mesh": ["FieldMesh"],
     "model.film": ["ElasticFilm"],
     "model.indenter": ["Cone", "Indenter", "Profile", "Rod", "RoundIndenter", "Sphere"],
-    "model.instrument": ["Equipment", "LoadCell", "StressSensor", "User"],
+    "model.instrument": ["Dynamics", "Equipment", "LoadCell", "StressSensor", "User"],
     "model.measured_stress": [
         "MeasuredPoints",
         "MeasuredProfile",

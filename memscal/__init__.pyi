@@ -83,6 +83,7 @@ from .model.indenter import Profile as Profile
 from .model.indenter import Rod as Rod
 from .model.indenter import RoundIndenter as RoundIndenter
 from .model.indenter import Sphere as Sphere
+from .model.instrument import Dynamics as Dynamics
 from .model.instrument import Equipment as Equipment
 from .model.instrument import LoadCell as LoadCell
 from .model.instrument import StressSensor as StressSensor

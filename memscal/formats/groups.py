@@ -21,7 +21,7 @@ from memscal.model.assumptions import Assumption
 from memscal.model.checks import QualityCheck, messages_from_json
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Cone, Indenter, Profile, Rod, RoundIndenter, Sphere
-from memscal.model.instrument import Equipment, LoadCell, StressSensor, User
+from memscal.model.instrument import Dynamics, Equipment, LoadCell, StressSensor, User
 from memscal.model.measured_stress import MeasuredScan
 from memscal.model.notation import VOLTS, Reading
 from memscal.model.provenance import Process, SourceFile
@@ -348,7 +348,10 @@ def _shape(file: SafeFile, path: str) -> str:
 
 def instrument_group(of: _MeasuredOn) -> Group:
     """Return the NXinstrument that holds the sensor, and load cell and stage if they are stated."""
-    parts = {"stress_sensor": write_record(records.SENSOR, of.sensor, **_NOWHERE)}
+    dynamics: Nodes = {}
+    if of.sensor.dynamics is not None:
+        dynamics["dynamics"] = write_record(records.DYNAMICS, of.sensor.dynamics)
+    parts = {"stress_sensor": write_record(records.SENSOR, of.sensor, **dynamics, **_NOWHERE)}
     if of.load_cell != LoadCell():
         parts["load_cell"] = write_record(records.LOAD_CELL, of.load_cell, **_NOWHERE)
     if of.stage != Equipment():
@@ -358,10 +361,14 @@ def instrument_group(of: _MeasuredOn) -> Group:
 
 def read_instrument(file: SafeFile, path: str = "/entry") -> Values:
     """Read sensor, load cell and stage, by these names; what is not stated stays empty."""
+    sensor_path = f"{path}/instrument/stress_sensor"
+    sensor = read_record(records.SENSOR, file, sensor_path)
+    dynamics_path = f"{sensor_path}/dynamics"
+    if file.has(dynamics_path):
+        with placed(file.where(dynamics_path)):
+            sensor["dynamics"] = Dynamics(**read_record(records.DYNAMICS, file, dynamics_path))
     return {
-        "sensor": StressSensor(
-            **read_record(records.SENSOR, file, f"{path}/instrument/stress_sensor")
-        ),
+        "sensor": StressSensor(**sensor),
         "load_cell": LoadCell(
             **read_record(records.LOAD_CELL, file, f"{path}/instrument/load_cell")
         ),

@@ -51,6 +51,7 @@ _LAYOUT = {
     "/entry/sample/film": records.FILM,
     "/entry/sample": records.SAMPLE,
     "/entry/instrument/stress_sensor": records.SENSOR,
+    "/entry/instrument/stress_sensor/dynamics": records.DYNAMICS,
     "/entry/instrument/load_cell": records.LOAD_CELL,
     "/entry/instrument/stage": records.STAGE,
     "/entry/user": records.USER,

@@ -163,7 +163,7 @@ def _read_arrays(file: SafeFile, along: str, reading: Reading) -> Values:
     unused = {"repeat", "y_errors"} if along == "x" else {"repeat", "x", "x_errors"}
     arrays = read_record(records.TAKEN_FOR_GRANTED.read_in(reading), file, _DATA)
     for name, quantity in _DECLARED.items():
-        path = f"{_DATA}/{name}"
+        path = f"{_DATA}/{quantity.key}"
         if name not in unused and (file.has(path) or name in (along, "u_zz")):
             ndim = len(quantity.axes) if name in _OWN_SHAPE else None
             dimension = quantity.read_in(reading).dimension
@@ -271,7 +271,7 @@ def _rest_group(record: Scan) -> Group:
 def _nodes(scan: Scan, axes: tuple[str, ...], **arrays: FloatArray | None) -> Nodes:
     """Return arrays along some axes; those with one more run along the sensors, too."""
     return {
-        name: si(
+        _DECLARED[name].key: si(
             array,
             _DECLARED[name].read_in(scan.reading).dimension,
             ("sensor", *axes)[-array.ndim :],

@@ -29,7 +29,14 @@ from memscal.model.provenance import SourceFile, accepted_alterations
 from memscal.model.records import points_record
 
 _CHANNELS = ("zz", "xz", "yz")
-_NOT_ALWAYS = ("centre_y", "centre_y_errors", "load_errors", "lubrication")
+_NOT_ALWAYS = (
+    "centre_y",
+    "centre_y_errors",
+    "load_errors",
+    "lubrication",
+    "direction",
+    "tangential_load",
+)
 
 
 def _read_points(file: SafeFile, name: str, of: Reading) -> dict[str, MeasuredPoints]:
@@ -77,7 +84,7 @@ def _read_scans(
                 indenter=groups.read_round_indenter(file, f"{path}/indenter"),
                 **groups.read_instrument(file, path),
                 lubrication=lubrication,
-                motion=file.optional_text(f"{path}/indenter/motion"),
+                **read_record(records.SLIDING, file, f"{path}/indenter"),
                 source=source,
                 **numbers,
             )
@@ -211,6 +218,7 @@ def _entry(measured: MeasuredStress) -> Group:
 def _profile_group(profile: MeasuredProfile, scans: tuple[MeasuredScan, ...]) -> Group:
     record = records.STRESS_NUMBERS.read_in(profile.scan.reading)
     stated = {q.name: getattr(profile, q.name, None) for q in record.quantities}
+    stated["direction"] = profile.direction or None
     # A line does not determine its centre across it.
     for i, name in enumerate(("centre", "centre_y")):
         if i == 0 or profile.centre_uncertainty[i] > 0:

@@ -318,6 +318,9 @@ def measured_scan(scan: Scan) -> MeasuredScan:
         width=_width(scan),
         lubrication=scan.lubrication,
         motion=scan.motion,
+        speed=scan.speed,
+        sliding_friction=scan.sliding_friction,
+        sliding_friction_uncertainty=scan.sliding_friction_uncertainty,
         position_scale_uncertainty=scan.position_scale_uncertainty,
         gain_uncertainty=scan.gain_uncertainty,
         position_errors_by_repeat=scan.position_errors_by_repeat,
@@ -381,10 +384,19 @@ def measured_profile(
         baseline=restored.baseline,
         baseline_uncertainty=restored.baseline_uncertainty,
         contact_radius=signal.contact_radius,
+        direction=scan.directions[0],
+        tangential_load=_tangential_load(scan),
         curve_r=curve_r,
         curve_s_zz=restored.blurred_stress(curve_r),
         points=_points(scan, electronic, restored),
     )
+
+
+def _tangential_load(scan: Scan) -> float | None:
+    """Mean tangential load, in N, where one was recorded."""
+    if scan.tangential_load is None or np.isnan(scan.tangential_load).all():
+        return None
+    return float(np.nanmean(scan.tangential_load))
 
 
 def _points(scan: Scan, noise: FloatArray, restored: Restoration) -> Mapping[str, MeasuredPoints]:

@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from itertools import chain
 from os import PathLike
 
 import numpy as np
@@ -51,7 +52,7 @@ from memscal.model.indenter import Rod
 from memscal.model.measured_stress import MeasuredScan
 from memscal.model.provenance import accepted_alterations
 from memscal.model.records import FILM, SENSOR
-from memscal.model.scan import Scan
+from memscal.model.scan import DIRECTIONS, Scan
 from memscal.model.sizes import MOST_OF_CONTACT, too_large
 from memscal.parallel import single_threaded
 from memscal.progress import reported
@@ -67,7 +68,12 @@ _SCATTER = 0.15
 
 
 def single_loads(scan: Scan) -> tuple[Scan, ...]:
-    """Split a scan by load, the smallest first; one that records no loads stays whole."""
+    """Split a scan by direction of sliding, and by load, if recorded, the smallest first."""
+    directions = [scan.only_direction(sign) for sign in scan.directions]
+    return tuple(chain(*map(_by_load, directions)))
+
+
+def _by_load(scan: Scan) -> tuple[Scan, ...]:
     # Lines whose median loads lie within 5 % of each other are repeats of one load, the median of
     # all recorded ones.  A line at several loads, or without any, raises an InputError.
     if scan.normal_load is None:
@@ -108,7 +114,8 @@ def place_of(scan: Scan) -> str:
 
 def load_of(scan: Scan) -> str:
     """Name a scan's file, load and lubrication, for messages."""
-    words = (place_of(scan), f"{scan.load:.4g} N", scan.lubrication)
+    slid = " and ".join(DIRECTIONS.get(sign, "") for sign in scan.directions)
+    words = (place_of(scan), f"{scan.load:.4g} N", slid, scan.lubrication)
     return ", ".join(filter(None, words))
 
 

@@ -33,6 +33,7 @@ from memscal.model.instrument import Equipment, LoadCell, StressSensor
 from memscal.model.notation import Reading, format_measured
 from memscal.model.provenance import Process, SourceFile
 from memscal.model.result import Result
+from memscal.model.scan import DIRECTIONS
 
 #: Millimetres in a metre, millivolts in a volt.
 _FILE_SCALE = 1e3
@@ -46,7 +47,8 @@ class MeasuredScan:
 
     ``width``: its largest extent, in m; ``position_scale_uncertainty``, ``gain_uncertainty``:
     relative, of the stage and of the sensor's chain; ``position_errors_by_repeat``: whether the
-    errors of its positions are new in each repeat;
+    errors of its positions are new in each repeat; ``speed``: of the indenter, in m/s, and
+    ``sliding_friction``, where a sliding scan states them;
     ``synthetic``: whether it was simulated; ``source``: the file it was read from; ``unit``: SI
     unit of its readings where they are no voltages.
 
@@ -69,6 +71,9 @@ class MeasuredScan:
     stage: Equipment = field(default_factory=Equipment)
     lubrication: str = ""
     motion: str = ""
+    speed: float | None = None
+    sliding_friction: float | None = None
+    sliding_friction_uncertainty: float | None = None
     position_scale_uncertainty: float | None = None
     gain_uncertainty: float | None = None
     position_errors_by_repeat: bool = False
@@ -157,6 +162,10 @@ class MeasuredProfile(ByContent):
         Baseline in the middle of the scan, in V.
     contact_radius : float
         Of the frictionless contact at the nominal load, in m.
+    direction : float
+        1 where the indenter slid along the positions, -1 where against them, 0 where not stated.
+    tangential_load : float, optional
+        Mean of the loads along the positions, in N, where they were recorded.
     curve_r, curve_s_zz : ndarray, shape (m,)
         The restored stress blurred by G, in Pa, at radii in m: a smooth curve through the points.
     points : mapping of str to MeasuredPoints
@@ -191,6 +200,8 @@ class MeasuredProfile(ByContent):
     baseline: float
     baseline_uncertainty: float
     contact_radius: float
+    direction: float = 0.0
+    tangential_load: float | None = None
     curve_r: FloatArray = field(default_factory=lambda: np.zeros(0))
     curve_s_zz: FloatArray = field(default_factory=lambda: np.zeros(0))
     points: Mapping[str, MeasuredPoints] = field(default_factory=dict)
@@ -210,8 +221,9 @@ class MeasuredProfile(ByContent):
 
     @property
     def label(self) -> str:
-        """Load and lubrication in words, as in ``"0.34 N, dry"``."""
-        return ", ".join(filter(None, (f"{self.load:.4g} N", self.lubrication)))
+        """Load, direction of sliding and lubrication in words, as in ``"0.34 N, forth, dry"``."""
+        words = (f"{self.load:.4g} N", DIRECTIONS.get(self.direction), self.lubrication)
+        return ", ".join(filter(None, words))
 
     @property
     def lubrication(self) -> str:

@@ -46,6 +46,7 @@ DIMENSIONS = {
     "temperature": Dimension("K", "K", "K"),
     "time": Dimension("s", "s", "s"),
     "frequency": Dimension("Hz", "Hz", "Hz"),
+    "speed": Dimension("m/s", "mm/s", "mm/s", MM),
     "stress per length": Dimension("Pa/m", "MPa/mm", "MPa/mm", 1e9),
 }
 

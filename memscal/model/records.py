@@ -47,11 +47,19 @@ INDENTER_FACE = record(
     signal="z",
 )
 _LOAD = measured(Quantity("load", "force", "load", "P", required=True))
+SLIDING = record(
+    "NXcollection",
+    Quantity("motion", "text", "motion of the indenter"),
+    Quantity("speed", "speed", "speed of the indenter", "V"),
+    *measured(Quantity("sliding_friction", _ONE, "sliding friction", "μ")),
+)
+"""How an indenter moves over the film."""
+
 LOAD = record(
     "NXcollection",
     *_LOAD,
     Quantity("rod_friction", _ONE, "friction of the rod", stored="friction_coefficient"),
-    Quantity("motion", "text", "motion of the indenter"),
+    *SLIDING.quantities,
 )
 INDENTER = record(
     "NXcollection",
@@ -77,6 +85,16 @@ SENSOR = record(
     Quantity("manufacturer", "text", "manufacturer of the sensor"),
     *measured(Quantity("temperature", "temperature", "temperature of the sensor")),
 )
+DYNAMICS = record(
+    "NXcollection",
+    *measured(Quantity("low_pass", "frequency", "low-pass", "f_c")),
+    *measured(Quantity("resonance", "frequency", "resonance", "f₀")),
+    *measured(Quantity("quality", _ONE, "quality of the resonance", "Q")),
+    *measured(Quantity("creep_share", _ONE, "share of the creep", "g")),
+    *measured(Quantity("creep_time", "time", "time of the creep", "τ")),
+    Quantity("creep_record", "time", "length of the record of the creep"),
+)
+"""How a sensor follows a signal in time."""
 
 
 def _equipment(nx_class: str, words: str, origin: str) -> Record:
@@ -129,11 +147,13 @@ SCAN_DATA = record(
         _X,
         Quantity("normal_load", "force", "load at each point", "P"),
         Quantity("normal_load_errors", "force", "standard uncertainty of the load"),
+        Quantity("tangential_load", "force", "tangential load", "Q"),
         Quantity("u_xz", _U, "voltage of the channel xz", "U_xz"),
         Quantity("u_xz_errors", _U, "noise of the channel xz"),
         Quantity("u_yz", _U, "voltage of the channel yz", "U_yz"),
         Quantity("u_yz_errors", _U, "noise of the channel yz"),
         Quantity("time", "time", "time from the first reading", "t"),
+        Quantity("sliding_direction", _ONE, "direction of sliding", stored="direction"),
     ),
     # One number of a single sensor.
     Quantity("reading_high", _U, "end of the range of each sensor", axes=("sensor",)),
@@ -387,6 +407,8 @@ STRESS_NUMBERS = record(
     *measured(Quantity("centre_y", _L, "centre along y", "y₀")),
     *required(*measured(Quantity("baseline", _U, "baseline", "U₀"))),
     Quantity("contact_radius", _L, "contact radius", "a", required=True),
+    Quantity("direction", _ONE, "direction of sliding"),
+    Quantity("tangential_load", "force", "mean tangential load", "Q"),
 )
 STRESS_CURVE = record(
     "NXdata",

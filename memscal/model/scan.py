@@ -35,7 +35,14 @@ from memscal.model.notation import Reading
 from memscal.model.provenance import SourceFile
 from memscal.model.stress import StressProfile
 
-LIKE_SIGNAL = ("u_zz_errors", "normal_load", "normal_load_errors", "time")
+LIKE_SIGNAL = (
+    "u_zz_errors",
+    "normal_load",
+    "normal_load_errors",
+    "tangential_load",
+    "time",
+    "sliding_direction",
+)
 """Arrays of a scan that have the shape of its readings, where they are stated."""
 
 OF_SENSORS = ("layout", "layout_uncertainty", "used", "reading_low", "reading_high", "board")
@@ -46,6 +53,9 @@ LUBRICATIONS = ("", "dry", "lubricated")
 
 MOTIONS = ("", "pressed", "sliding", "rest")
 """How an indenter moved; one that states nothing was pressed.  A noise record has none: rest."""
+
+DIRECTIONS = {1.0: "forth", -1.0: "back"}
+"""Words of the directions of a sliding indenter: along the positions, and against them."""
 
 STATED_ERRORS = (
     "position_scale",
@@ -62,6 +72,8 @@ STATED_ERRORS = (
 BRANCHES = {"approach": 1, "retreat": 2}
 """Numbers of the indenter's branches; 0 where none is stated."""
 
+#: One value of these is that of a whole row, or of all.
+_BY_ROW = ("branch", "sliding_direction")
 #: Points that spread by less of their length across it are a line.
 LINE = 0.01
 
@@ -265,6 +277,8 @@ class Scan:
     normal_load, normal_load_errors : ndarray, shape of ``u_zz``, optional
         Load at each point where it was recorded, and its standard uncertainty, independent from
         point to point, in N.
+    tangential_load : ndarray, shape of ``u_zz``, optional
+        Load along the positions at each point where it was recorded, in N.
     time : ndarray, shape of ``u_zz``, optional
         Time of each reading from the first one, in s; NaN where it is not known.
     averaging_length : float, optional
@@ -305,6 +319,13 @@ class Scan:
     motion : str
         ``"pressed"`` at each place, which an empty one stands for, or ``"sliding"``; ``"rest"``
         of a noise record, readings in time with nothing pressed, whose positions are zero.
+    sliding_direction : ndarray, shape of ``u_zz``, optional
+        1 where a sliding indenter moved along the positions, -1 where against them; one value, and
+        one for each row of a ``u_zz`` of two axes, are accepted.
+    speed : float, optional
+        Speed of the indenter, in m/s; used where no ``time`` tells it.
+    sliding_friction, sliding_friction_uncertainty : float, optional
+        Tangential over normal load of a sliding indenter, where it was measured.
     lubrication, lubricant : str
         ``"dry"`` or ``"lubricated"``, empty if not stated, and the name of the lubricant.
     title, start_time, end_time, notes : str
@@ -352,6 +373,7 @@ class Scan:
     u_zz_errors: FloatArray | None = None
     normal_load: FloatArray | None = None
     normal_load_errors: FloatArray | None = None
+    tangential_load: FloatArray | None = None
     time: FloatArray | None = None
     averaging_length: float | None = None
     dwell_time: float | None = None
@@ -374,6 +396,10 @@ class Scan:
     load_uncertainty: float | None = None
     rod_friction: float | None = None
     motion: str = ""
+    sliding_direction: FloatArray | None = None
+    speed: float | None = None
+    sliding_friction: float | None = None
+    sliding_friction_uncertainty: float | None = None
     lubrication: str = ""
     lubricant: str = ""
     title: str = ""
@@ -523,6 +549,28 @@ class Scan:
             return replace(self, **_rows(self, np.atleast_1d(numbers)))
         return only_points(self, np.flatnonzero(np.isin(self.passes, numbers)))
 
+    @property
+    def directions(self) -> tuple[float, ...]:
+        """Directions in which a sliding indenter moved, 1 before -1; 0 alone if none is stated."""
+        signs = 0.0 if self.sliding_direction is None else self.sliding_direction
+        return tuple(np.unique(signs)[::-1].tolist())
+
+    def only_direction(self, sign: float) -> Scan:
+        """Return the passes of one of the ``directions``."""
+        if self.directions == (sign,):
+            return self
+        numbers = np.unique(self.passes[self.sliding_direction == sign])
+        passes = self.only_passes(numbers)
+        if passes.directions != (sign,):
+            raise InputError(
+                "A pass of the scan holds both directions of sliding.",
+                why="The stress under an indenter that slides forth is not that of one that slides "
+                "back.",
+                cure="Number the passes (repeat, --repeat COLUMN), or give each direction as a "
+                "scan of its own.",
+            )
+        return passes
+
     def _freeze_array(self) -> None:
         """Freeze what an array states of its sensors, and prove the scan of each by itself."""
         names = tuple(map(str, self.sensors))
@@ -629,23 +677,23 @@ class Scan:
                 object.__setattr__(self, name, self._like_signal(name, values))
         if self.branch is not None:
             branch = branch_numbers("branch of the scan", self.branch)
-            if branch.shape == self.u_zz.shape[:-1] != ():
-                branch = np.broadcast_to(branch[:, None], self.u_zz.shape)
             object.__setattr__(self, "branch", self._like_signal("branch", branch, np.int64))
 
     def _like_signal(self, name: str, values: ArrayLike, dtype: Any = np.float64) -> FloatArray:
         array = frozen_array(values, dtype=dtype)
+        if name in _BY_ROW and array.shape in ((), self.u_zz.shape[:-1]):
+            array = np.broadcast_to(array[..., None], self.u_zz.shape)
         if array.shape != self.u_zz.shape:
             raise InputError(f"{name} has shape {array.shape}, but u_zz has {self.u_zz.shape}.")
         require_size(f"{name} of the scan", array)
         return array
 
     def _check_values(self) -> None:
-        for name, kind in (("u_zz", "voltage"), ("time", "time")):
+        for name in ("u_zz", "time", "tangential_load"):
             values = getattr(self, name)
             if values is not None and np.any(np.isinf(values)):
                 raise InputError(
-                    f"{name} holds an infinite {kind}.", cure="Mark missing points with NaN."
+                    f"{name} holds an infinite value.", cure="Mark missing points with NaN."
                 )
         for name in ("u_zz_errors", "normal_load_errors"):
             errors = getattr(self, name)
@@ -673,8 +721,9 @@ class Scan:
                 f"The direction of the scan is {self.direction!r}.",
                 cure="A line scan runs along 'x' or 'y'; a raster has its own y.",
             )
-        errors = [f"{name}_uncertainty" for name in ("load", *STATED_ERRORS)]
-        for name in (*errors, "averaging_length", "dwell_time"):
+        with_errors = ("load", "sliding_friction", *STATED_ERRORS)
+        errors = [f"{name}_uncertainty" for name in with_errors]
+        for name in (*errors, "averaging_length", "dwell_time", "speed", "sliding_friction"):
             require_non_negative(f"{name.replace('_', ' ')} of the scan", getattr(self, name))
         record = self.noise_record
         if record is not None and getattr(record, "motion", "") != "rest":
@@ -698,6 +747,15 @@ class Scan:
             raise InputError(
                 f"The motion of the indenter is {self.motion!r}.",
                 cure="Give 'pressed' or 'sliding' (/entry/indenter/motion), or leave it out.",
+            )
+        signs = self.sliding_direction
+        if signs is not None and (self.motion != "sliding" or np.any(np.abs(signs) != 1)):
+            raise InputError(
+                f"The scan has directions of sliding, {np.unique(signs)}, and its motion is "
+                f"{self.motion or 'pressed'}.",
+                why="An indenter that slides moves along the positions, 1, or against them, -1.",
+                cure="Give the motion 'sliding' (/entry/indenter/motion) and directions of 1 and "
+                "-1 (/entry/data/direction), or no directions.",
             )
         if self.lubricant and self.lubrication != "lubricated":
             stated = self.lubrication or "not stated"

@@ -39,6 +39,9 @@ SCANS = tuple(
         width=3e-3,
         lubrication=lubrication,
         motion="sliding",
+        speed=1e-3,
+        sliding_friction=0.3,
+        sliding_friction_uncertainty=0.02,
         position_scale_uncertainty=scale,
         gain_uncertainty=scale,
         stage=Equipment(name="stage", serial_number="8"),
@@ -94,10 +97,13 @@ def make_stress_profile(load, n=7, **fields):
     return MeasuredProfile(**(made | fields))
 
 
+BACK = {"direction": -1.0, "tangential_load": -0.15}
+
+
 def make_stress(**fields):
     process = Process(program="memscal", version="1", date="", configuration={"override": True})
     made = {
-        "profiles": (make_stress_profile(0.5, scan=SCANS[0]), make_stress_profile(1.5, 9)),
+        "profiles": (make_stress_profile(0.5, scan=SCANS[0], **BACK), make_stress_profile(1.5, 9)),
         "scans": SCANS,
         "conversion_constant": 1e-7 / 3,
         "conversion_constant_uncertainty": 7e-10 / 3,

@@ -31,6 +31,7 @@ _MEASURED_ON = {
     "sample": records.SAMPLE,
     "sample/film": records.FILM,
     "instrument/stress_sensor": records.SENSOR,
+    "instrument/stress_sensor/dynamics": records.DYNAMICS,
     "instrument/load_cell": records.LOAD_CELL,
 }
 _SCANNED = {**_MEASURED_ON, "instrument/stage": records.STAGE, "user": records.USER}

@@ -8,6 +8,7 @@ from helpers.builders import make_profile, make_scan
 from hypothesis import given
 from hypothesis import strategies as st
 
+from memscal import Dynamics
 from memscal.errors import InputError
 
 
@@ -40,7 +41,7 @@ def test_a_line_that_is_repeated_once_is_still_repeats():
         ("line", {"u_zz_errors": np.zeros(3)}, "u_zz_errors has shape"),
         ("line", {"channels": {"u_yz": np.zeros(7)}}, "u_yz has shape"),
         ("line", {"x": np.full(33, np.nan)}, "x of the scan holds a value that is not finite"),
-        ("line", {"u_zz": np.full(33, np.inf)}, "infinite voltage"),
+        ("line", {"u_zz": np.full(33, np.inf)}, "infinite value"),
         ("line", {"u_zz_errors": np.full(33, -1e-6)}, "negative or infinite"),
         ("line", {"load": 0.0}, "load of the scan is 0 N"),
         ("line", {"load_uncertainty": -0.01}, "load uncertainty of the scan"),
@@ -53,6 +54,12 @@ def test_a_line_that_is_repeated_once_is_still_repeats():
             {"normal_load": None, "normal_load_errors": np.full(33, 0.02)},
             "without normal_load",
         ),
+        ("line", {"sliding_direction": 1}, "motion is pressed"),
+        ("line", {"sliding_direction": 0, "motion": "sliding"}, "directions of sliding"),
+        ("repeats", {"sliding_direction": [1, 1], "motion": "sliding"}, r"shape \(2,\)"),
+        ("line", {"speed": -1e-3}, "speed of the scan"),
+        ("line", {"sliding_friction": -0.1}, "sliding friction of the scan"),
+        ("line", {"tangential_load": np.full(33, np.inf)}, "tangential_load holds an infinite"),
         ("line", {"lubrication": "wet"}, "lubrication of the scan is 'wet'"),
         ("line", {"lubrication": "dry", "lubricant": "glycerol"}, "'glycerol'.*is dry"),
         ("line", {"lubricant": "glycerol"}, "'glycerol'.*is not stated"),
@@ -61,6 +68,46 @@ def test_a_line_that_is_repeated_once_is_still_repeats():
 def test_a_scan_that_contradicts_itself_is_refused(kind, changes, problem):
     with pytest.raises(InputError, match=problem):
         make_scan(kind, **changes)
+
+
+@pytest.mark.parametrize(
+    ("stated", "problem"),
+    [
+        ({"low_pass": 0.0}, "low_pass of the sensor is 0"),
+        ({"low_pass": np.inf}, "low_pass of the sensor is inf"),
+        ({"low_pass": 3.0, "low_pass_uncertainty": -0.1}, "low_pass_uncertainty of the sensor"),
+        ({"low_pass_uncertainty": 0.1}, "low_pass_uncertainty, but no low_pass"),
+        ({"quality": 2.0}, "quality, but no resonance"),
+        ({"resonance": 90.0}, "resonance, but no quality"),
+        ({"creep_share": 0.05}, "creep_share, but no creep_time"),
+        ({"creep_record": 60.0}, "creep_record, but no creep_share"),
+        ({"creep_share": 1.0, "creep_time": 1.0}, "creep_share of the sensor is 1"),
+    ],
+)
+def test_dynamics_that_are_not_whole_are_refused(stated, problem):
+    with pytest.raises(InputError, match=problem):
+        Dynamics(**stated)
+
+
+@pytest.mark.parametrize("kind", ["repeats", "points"])
+def test_passes_of_one_direction_are_told_from_those_of_the_other(kind):
+    scan = make_scan(kind)
+    rows = np.where(scan.passes % 2, -1.0, 1.0)
+    if np.ptp(rows) == 0:
+        rows[-9:] = -1.0
+        scan = replace(scan, repeat=np.where(rows > 0, 1, 2))
+    scan = replace(scan, motion="sliding", sliding_direction=rows)
+    assert scan.directions == (1.0, -1.0)
+    both = [scan.only_direction(sign) for sign in scan.directions]
+    assert [part.directions for part in both] == [(1.0,), (-1.0,)]
+    assert sum(part.u_zz.size for part in both) == scan.u_zz.size
+    assert np.array_equal(both[1].u_zz.ravel(), scan.u_zz[rows < 0], equal_nan=True)
+
+
+def test_a_pass_of_both_directions_is_refused():
+    scan = make_scan(motion="sliding", sliding_direction=np.where(np.arange(33) < 9, 1, -1))
+    with pytest.raises(InputError, match="holds both directions"):
+        scan.only_direction(1.0)
 
 
 def test_a_scan_keeps_its_own_copy_of_its_data():
