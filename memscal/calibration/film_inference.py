@@ -18,7 +18,7 @@ import numpy as np
 from memscal.calibration.stages import Solution, solve
 from memscal.calibration.uncertainty import input_effects
 from memscal.errors import InputError, MemscalError
-from memscal.estimation.forward import ForwardModel
+from memscal.estimation.forward import forward_model
 from memscal.estimation.points import loads_differ
 from memscal.estimation.profile import log_marginal_likelihood
 from memscal.estimation.reference_spectra import reference_spectra
@@ -276,7 +276,7 @@ def free_thickness(solution: Solution) -> FreeThickness:
             for film, thickness in zip(films, stated + z * u, strict=True)
         }
         rods = [press_rod(*s.set_up._replace(film=varied[s.set_up.film])) for s in scans]
-        model = ForwardModel(estimate.points, reference_spectra(rods, points, nodes))
+        model = forward_model(estimate.points, reference_spectra(rods, points, nodes))
         varied_estimate = replace(estimate, model=model)
         return log_marginal_likelihood(varied_estimate, inputs, estimate.noise_scale) - z @ z / 2
 

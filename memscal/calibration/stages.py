@@ -195,7 +195,7 @@ def prepare_fields(
     data = estimate.points
     if smoothed and (data.as_raster or (data.planar and not divided)):
         return RasterFields.place(estimate, smoothed, choice, divided)
-    if divided and not (estimate.model.sums_waves or data.as_raster):
+    if divided and not (estimate.model.round_references or data.as_raster):
         raise InputError(
             "The reference is a field that is not round, which a line does not show.",
             why="A division needs the voltage over the plane, as one raster has it.",
@@ -247,7 +247,7 @@ class Solution:
     @property
     def comparable(self) -> bool:
         """Whether the fields can be divided, so that both routes are open."""
-        round_fields = self.estimate.model.sums_waves or self.estimate.points.as_raster
+        round_fields = self.estimate.model.round_references or self.estimate.points.as_raster
         return self.smoothed is not None and self.fields.even and round_fields
 
     @cached_property

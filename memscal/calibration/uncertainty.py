@@ -33,7 +33,7 @@ from memscal.errors import InputError
 from memscal.estimation.decorrelation import SlowNoise
 from memscal.estimation.influences import influences, measured_by, signal_by
 from memscal.estimation.points import ScanPoints
-from memscal.estimation.profile import ProfileEstimate
+from memscal.estimation.profile import ProfileEstimate, dynamics_changes
 from memscal.estimation.reference_spectra import (
     RECTANGLE,
     carried_force,
@@ -110,6 +110,8 @@ def input_effects(
         pairs = zip(alternatives, model.references, strict=True)
         changes["model_form"] = [RECTANGLE * (other.values - own.values) for other, own in pairs]
     effects = {n: InputEffect(-signal_by(estimate, change)) for n, change in changes.items()}
+    by_dynamics = dynamics_changes(estimate, estimate.kernel)
+    effects |= {name: InputEffect(-change) for name, change in by_dynamics.items()}
     effects |= _taken_for_granted(scans, estimate) | _load_effects(scans, stresses, estimate)
     varying = _varying_gain(estimate)
     if varying:

@@ -54,6 +54,7 @@ class FieldModel(ForwardModel):
     """Voltages at the points of scans through fields."""
 
     sums_waves: ClassVar[bool] = False
+    round_references: ClassVar[bool] = False
 
     @cached_property
     def _plane(self) -> _Plane:

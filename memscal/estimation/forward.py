@@ -32,6 +32,7 @@ from memscal.axisymmetry.hankel import ACROSS, RadialSpectrum, bessel, radial_sp
 from memscal.axisymmetry.kernels import gaussian_transfer
 from memscal.estimation.points import ScanPoints
 from memscal.estimation.voltage_map import BLOCK, DENSE
+from memscal.extensions import hook
 from memscal.model.arrays import (
     ArrayPair,
     ArrayTriple,
@@ -189,6 +190,7 @@ class ForwardModel:
     # Transform of the base stress per newton for each scan, on the same nodes.
     references: tuple[RadialSpectrum, ...]
     sums_waves: ClassVar[bool] = True  # voltages are sums of waves around a centre
+    round_references: ClassVar[bool] = True
 
     @property
     def reference(self) -> RadialSpectrum:
@@ -417,4 +419,4 @@ def forward_model(points: ScanPoints, references: Sequence[RadialSpectrum]) -> F
         )
     models = [reference.model for reference in references if reference.model]
     model: ForwardModel = [*models, ForwardModel][0](points, tuple(references))
-    return model
+    return hook("moving_model")(model) if points.in_motion else model

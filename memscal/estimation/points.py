@@ -18,8 +18,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from memscal.errors import FitError, InputError
 from memscal.estimation.decorrelation import Decorrelation
+from memscal.extensions import hook
 from memscal.model.arrays import BoolArray, FloatArray, IndexArray, array_record
 from memscal.model.correlation import is_banded, of_points, root_of
+from memscal.model.instrument import Dynamics
 from memscal.model.notation import VOLTS, Reading
 from memscal.model.places import Places
 from memscal.model.scan import Scan
@@ -120,6 +122,7 @@ class ScanPoints:
     anew: BoolArray  # (n,): whether each repeat has an error of its position of its own
     free: BoolArray  # (scans, 2): along x and y, whether the centre is a free parameter
     averaging: FloatArray  # (scans, 2): way along x and y over which each reading is the mean, in m
+    velocity: FloatArray  # (n,): of the indenter along its line, in m/s; zero where it stood
     missing: int  # how many points were missing
     decorrelation: Decorrelation | None = None  # makes noise of the stated correlation white
     channel: str = "zz"
@@ -127,6 +130,7 @@ class ScanPoints:
     # (scans,): standard deviation of each baseline's curvature, edge to centre, in V; 0: straight
     curvature: FloatArray = field(default_factory=lambda: np.zeros(0))
     unit: float = 1.0  # noise of a point of weight one, by which that prior is weighed
+    dynamics: Dynamics | None = None  # how the sensor follows readings that change
 
     @property
     def order(self) -> int:
@@ -142,6 +146,11 @@ class ScanPoints:
     def positions(self) -> FloatArray:
         """Positions of the indenter along x and y, shape (2, n), in m."""
         return np.stack([self.x, self.y])
+
+    @property
+    def in_motion(self) -> bool:
+        """Whether readings are not those of a still sensor: means, or of one that lags."""
+        return bool(self.averaging.any() or (self.dynamics and self.velocity.any()))
 
     @property
     def scans(self) -> int:
@@ -344,13 +353,23 @@ def measured_points(scan: Scan, channel: str = "zz") -> ScanPoints:
         scan=first,
         free=np.array([[along[0], along[1] or scan.planar]]),
         averaging=np.array([along]) * (scan.averaging_length or 0.0),
+        velocity=_velocities(scan)[keep],
         missing=u.size - count,
         decorrelation=None if correlation is None else _decorrelation(correlation, keep),
         channel=channel,
         reading=scan.reading,
+        dynamics=scan.sensor.dynamics,
     )
     _require_usable(points)
     return points
+
+
+def _velocities(scan: Scan) -> FloatArray:
+    """Return the velocity at each reading, in m/s; zero where no dynamics are stated."""
+    if scan.sensor.dynamics is None:
+        return np.zeros(scan.shape)
+    velocity: FloatArray = hook("velocities")(scan)
+    return velocity
 
 
 #: Standard deviation of a baseline's curvature, edge to centre, over the largest signal, where none
@@ -470,7 +489,12 @@ def joined_points(scans: Sequence[ScanPoints], owners: Sequence[int] | None = No
     number = np.repeat(np.arange(len(scans)), [points.u.size for points in scans])
     before = np.cumsum([0, *(points.repeat.max() + 1 for points in scans)])
     own = ("free", "averaging", "curvature")
-    names = ("x", "y", "u", "load", "x_errors", "branch", "anew", "repeat", *own)
+    if any(points.dynamics != scans[0].dynamics for points in scans):
+        raise InputError(
+            "The scans state different dynamics of the sensor.",
+            cure="Give scans of one sensor, or correct /entry/instrument/stress_sensor/dynamics.",
+        )
+    names = ("x", "y", "u", "load", "x_errors", "velocity", "branch", "anew", "repeat", *own)
     columns = {name: np.concatenate([getattr(each, name) for each in scans]) for name in names}
     columns["repeat"] += before[number]
     blocks = []
@@ -489,6 +513,7 @@ def joined_points(scans: Sequence[ScanPoints], owners: Sequence[int] | None = No
         channel=scans[0].channel,
         reading=scans[0].reading,
         unit=scans[0].unit,
+        dynamics=scans[0].dynamics,
     )
 
 

@@ -1,7 +1,7 @@
 """Estimate of a radial profile from the points of scans: centre, baseline, noise and outliers."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import cached_property
 
@@ -28,7 +28,16 @@ from memscal.estimation.outliers import (
 from memscal.estimation.plane import MOST_READINGS, Spots, plane_departures
 from memscal.estimation.points import ScanPoints
 from memscal.estimation.voltage_map import DENSE, VoltageMap, square_root
-from memscal.model.arrays import TINY, BoolArray, FloatArray, IndexArray, array_record, floats
+from memscal.extensions import hook
+from memscal.model.arrays import (
+    TINY,
+    Arrays,
+    BoolArray,
+    FloatArray,
+    IndexArray,
+    array_record,
+    floats,
+)
 from memscal.model.checks import OUTLIER_WEIGHT, Message
 from memscal.progress import done_with
 
@@ -39,10 +48,6 @@ NUMERICAL_FLOOR = 1e-6
 LEAST_SIGNIFICANCE = 5.0
 LEAST_DISTINCT = 3.0
 _WEIGHING_ROUNDS = 4
-#: Rounds that take off what means along the scan add, each right to some percent of the last, and
-#: points of a mean.
-_UNAVERAGING_ROUNDS = 2
-_NODES = 8
 #: Noise that is not stated is found to this share.
 _SAME_NOISE = 0.1
 #: Relative step of the derivatives of an ellipse.
@@ -223,7 +228,7 @@ class ProfileEstimate:
 
     @property
     def uneven(self) -> FloatArray:
-        """What references that are not round add to the voltages, shape (n,), in V."""
+        """What references that are not round, or motion, add to the voltages, (n,), in V."""
         if self.model.sums_waves:
             return np.zeros_like(self.points.u)
         even = ForwardModel(self.points, self.model.references)
@@ -269,6 +274,14 @@ def _root(numbers: VoltageMap, noise: FloatArray, factor: Decorrelation | None) 
     return factor.correlate_adjoint(scaled.T).T if factor else scaled
 
 
+def dynamics_changes(estimate: ProfileEstimate, kernel: FloatArray) -> Arrays:
+    """Return changes (n,) of the voltages, in V, by one u of each number of a sensor's dynamics."""
+    changes: Arrays = {}
+    if estimate.points.in_motion:
+        changes = hook("changes_by_dynamics")(estimate.model, estimate.gaussian.geometry, kernel)
+    return changes
+
+
 def estimate_profile(
     points: ScanPoints,
     *references: RadialSpectrum,
@@ -276,39 +289,10 @@ def estimate_profile(
     start: ProfileEstimate | None = None,
     begin_with: BoolArray | bool = True,
 ) -> ProfileEstimate:
-    """Estimate the radial profile, the centre and baseline of each scan, noise and outliers.
-
-    Readings that are means along the scan are brought to their positions by what is estimated.
-    """
+    """Estimate the radial profile, the centre and baseline of each scan, noise and outliers."""
     # With ``angular`` also what of a sensor that was scanned over the plane is not round.
     # ``start``, of nearly the same voltages at the same points, spares the search, which is among
     # the points (n,) to ``begin_with``.
-    estimate = _estimated(points, references, angular, start, begin_with)
-    for _ in range(_UNAVERAGING_ROUNDS if points.averaging.any() else 0):
-        at_positions = _at_positions(points, estimate)
-        estimate = _estimated(at_positions, references, angular, estimate, begin_with)
-    return estimate
-
-
-def _at_positions(points: ScanPoints, estimate: ProfileEstimate) -> ScanPoints:
-    """Return the points, less what a mean along the scan adds to the signal."""
-    # The mean of J_0(kR) over a way D along the scan is the factor sinc(k_x D/2) in the plane.
-    model = estimate.model
-    change = model.signal(model.geometry(estimate.centres), estimate.kernel)
-    for node, weight in zip(*np.polynomial.legendre.leggauss(_NODES), strict=True):
-        moved = model.geometry(estimate.centres - node / 2 * points.averaging)
-        change -= weight / 2 * model.signal(moved, estimate.kernel)
-    return replace(points, u=points.u + change)
-
-
-def _estimated(
-    points: ScanPoints,
-    references: Sequence[RadialSpectrum],
-    angular: bool,
-    start: ProfileEstimate | None,
-    begin_with: BoolArray | bool,
-) -> ProfileEstimate:
-    """Estimate the profile of readings at their positions."""
     model = forward_model(points, references)
     if start:
         fit = start.gaussian

@@ -94,6 +94,7 @@ HOOKS = {
     "columns_of_array": "extensions.arrays.import_array",
     "errors_of_sensors": "extensions.arrays.import_array",
     "drawn_as": "figures.style",
+    "changes_by_dynamics": "extensions.motion.moving_model",
     "html_image": "figures.report",
     "html_report": "figures.report",
     "atomic_write_bytes": "formats.files",
@@ -110,6 +111,7 @@ HOOKS = {
     "is_mesh": "extensions.meshes.mesh_files",
     "LiveScan": "extensions.acquisition.live_scan",
     "monte_carlo": "extensions.monte_carlo.monte_carlo",
+    "moving_model": "extensions.motion.moving_model",
     "place_in_name": "extensions.fleet.recipe",
     "positions": "extensions.acquisition.positions",
     "press_at_finite_strain": "extensions.finite_strain.solve",
@@ -121,6 +123,7 @@ HOOKS = {
     "accepted_differences": "formats.opened",
     "table_of": "summaries.table",
     "sweep_noise": "extensions.monte_carlo.sweep",
+    "velocities": "extensions.motion.velocities",
     "with_drawn_in": "extensions.meshes.mesh_files",
     "write_mesh": "extensions.meshes.mesh_files",
 }

@@ -67,6 +67,7 @@ class LoadPoints:
     contacts: FloatArray | None = None
     # (n, p): one where a reading is at the place, whose error it shares; without it none does.
     places: FloatArray | None = None
+    by_dynamics: FloatArray | None = None  # (q, n): changes by the sensor's dynamics, in V
 
     @property
     def radius(self) -> FloatArray:
@@ -157,6 +158,7 @@ def load_points(profile: MeasuredProfile, channel: str = "zz") -> LoadPoints:
         gain_share=profile.scan.gain_uncertainty or 0.0,
         correlation=points.correlation,
         places=places,
+        by_dynamics=points.by_dynamics,
     )
 
 
@@ -210,6 +212,7 @@ def points_at(
         correlation=None,
         contacts=None,
         places=None,
+        by_dynamics=None,
     )
 
 
@@ -331,6 +334,9 @@ def predict(points: LoadPoints, sensor: Sensor, members: ProfileFamily, load: in
     columns["position_scale"] = columns.get("position_scale", 0.0) + stretched
     signal = at_points(transfer * spectra) + by_load * points.log_load
     columns["between_scan_gain"] = points.own_gain * signal[..., None] * points.scan
+    if points.by_dynamics is not None:
+        changes = np.broadcast_to(points.by_dynamics.T, (*signal.shape, len(points.by_dynamics)))
+        columns["dynamics"] = changes
     return Predicted(
         signal=signal,
         by_load=by_load,

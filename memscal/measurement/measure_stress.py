@@ -35,7 +35,7 @@ from memscal.readings.mistaken_unit import require_span
 from memscal.readings.noise_record import record_messages
 
 #: Sources of a force's uncertainty that all profiles have in common.
-SHARED_SOURCES = ("apparatus", "film", "position_scale", "load")
+SHARED_SOURCES = ("apparatus", "film", "position_scale", "load", "dynamics")
 
 #: What the shapes of pressure leave open of the mean force of several, whose shapes differ.
 _NEGLIGIBLE_MEAN = 0.005
@@ -87,7 +87,7 @@ def pooled_force(profiles: Sequence[MeasuredProfile]) -> tuple[float, float]:
     ratio = np.array([profile.force / profile.load for profile in profiles])
     variance = np.sum((weight * scan) ** 2)
     for source in SHARED_SOURCES:
-        variance += (weight @ [budget[source] for budget in budgets]) ** 2
+        variance += (weight @ [budget.get(source, 0.0) for budget in budgets]) ** 2
     return float(weight @ ratio), math.sqrt(variance)
 
 

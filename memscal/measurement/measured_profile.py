@@ -218,7 +218,8 @@ def _found_quickly(scan: Scan, apparatus: ApparatusFunction) -> _Found:
     signal = fit.conversion_constant * fit.jacobian[:, 0]
     rest = points.u - fit.predicted
     count = fit.jacobian.shape[1]
-    return _Found(fit.centre[0], fit.geometry.radius, signal, rest, np.ones_like(rest), count)
+    distance = np.hypot(*model.offset(fit.centre))
+    return _Found(fit.centre[0], distance, signal, rest, np.ones_like(rest), count)
 
 
 @array_record
@@ -351,9 +352,10 @@ def measured_profile(
     average: Any = csr_array((share, (place, np.arange(noise.size))))
     r = np.hypot(x - restored.centre[0], y - restored.centre[1])
     order = np.argsort(r, kind="stable")
-    background = posterior.estimate.model.drift_columns @ posterior.drift
+    estimate = posterior.estimate
+    background = estimate.model.drift_columns @ posterior.drift
     average = average[order]
-    s_zz = average @ (restored.points.u - background) / a
+    s_zz = average @ (restored.points.u - estimate.uneven - background) / a
     decorrelation = restored.points.decorrelation
     if decorrelation:
         # Of repeats there are more columns than positions.
@@ -364,6 +366,9 @@ def measured_profile(
     u_a = restored.apparatus.parameters.uncertainty("conversion_constant")
     roots = {"noise": noise_root / a, "conversion_constant": u_a / a * s_zz[:, None]}
     roots |= _place_roots(restored, average)
+    points = _points(scan, electronic, restored)
+    if points["zz"].by_dynamics is not None:
+        roots["dynamics"] = average @ points["zz"].by_dynamics.T / a
     maximum, budget = _on_axis(restored)
     curve_r = np.linspace(0.0, r[order][-1], 301)
     return MeasuredProfile(
@@ -388,7 +393,7 @@ def measured_profile(
         tangential_load=_tangential_load(scan),
         curve_r=curve_r,
         curve_s_zz=restored.blurred_stress(curve_r),
-        points=_points(scan, electronic, restored),
+        points=points,
     )
 
 
@@ -400,15 +405,18 @@ def _tangential_load(scan: Scan) -> float | None:
 
 
 def _points(scan: Scan, noise: FloatArray, restored: Restoration) -> Mapping[str, MeasuredPoints]:
-    # Readings that are means along the scan count as those at their positions.
-    raw = measured_points(restored.scan)
+    # Readings in motion count as those of a still sensor.
     normal = measured_points(scan)
-    normal = replace(normal, u=normal.u + restored.points.u - raw.u)
+    normal = replace(normal, u=normal.u - restored.posterior.estimate.uneven)
     if not noise.any():
         # Only the electronic noise scatters: it is that of the restoration.
         noise = np.full_like(noise, restored.noise.min())
     weight = restored.posterior.estimate.outlier_weight
-    points = {"zz": _channel_points(scan, normal, noise[measured_mask(scan)], weight)}
+    zz = _channel_points(scan, normal, noise[measured_mask(scan)], weight)
+    by_dynamics = restored.posterior.shifts.get("dynamics")
+    if by_dynamics is not None:
+        zz = replace(zz, by_dynamics=-by_dynamics.T)
+    points = {"zz": zz}
     for channel in TANGENTIAL:
         if f"u_{channel}" in scan.channels:
             # The normal stress does not need it; a comparison of the shear states what is missing.

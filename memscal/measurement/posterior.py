@@ -40,7 +40,7 @@ from memscal.estimation.bayesian import Weighing, weigh_departures
 from memscal.estimation.departures import DepartureBasis, ReducedScan, Side, departure_basis
 from memscal.estimation.gaussian import GaussianFit
 from memscal.estimation.points import ScanPoints
-from memscal.estimation.profile import ProfileEstimate
+from memscal.estimation.profile import ProfileEstimate, dynamics_changes
 from memscal.estimation.reference_spectra import law_at_once, law_sensitivities, rod_spectrum
 from memscal.estimation.voltage_map import VoltageMap
 from memscal.mechanics.film_response import base_response
@@ -289,13 +289,11 @@ def _shape_columns(
     for i, (shape, width) in enumerate(zip(shapes, widths, strict=True)):
         kernels[:, i], slopes[:, i] = shape.transform(model.k, width)
     signal, widening = np.hsplit(model.signal(geometry, np.hstack([kernels, slopes])), 2)
-    radial = forces * model.radial_derivative(geometry, kernels)
-    towards = model.by_free_centres(geometry.towards)
+    centre = [model.centre_derivative(geometry, kernel) for kernel in (forces * kernels).T]
     drift = model.drift_columns[:, None]
     drift = np.broadcast_to(drift, (*signal.shape, drift.shape[-1]))
     own = np.stack([signal, forces * widening], axis=2)
-    centre = radial[:, :, None] * towards[:, None]
-    return np.concatenate([own, centre, drift], axis=2)
+    return np.concatenate([own, np.stack(centre, axis=1), drift], axis=2)
 
 
 #: Eigenvalues of the covariance of A G below this share of the largest count as zero.
@@ -375,6 +373,9 @@ def posterior_of(
         "film": _signals(estimate, mean, together),
         "position_scale": stretched[:, None],
     }
+    by_dynamics = dynamics_changes(estimate, mean[:nodes])
+    if by_dynamics:
+        shifts["dynamics"] = np.column_stack([*by_dynamics.values()])
     if "load" in shared:
         shifts["load"] = _signals(estimate, mean, (shared["load"] * film)[:, None])
     changes = {}

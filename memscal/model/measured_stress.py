@@ -99,7 +99,9 @@ class MeasuredPoints(ByContent):
     ``x``, ``y``: positions, zero across a line, ``x_errors``: standard uncertainty along the
     scan, in m; ``u``: voltage, ``noise``: its electronic noise, stated or estimated, in V,
     ``None`` where a tangential channel states none; ``weight``: of outliers, one of ordinary
-    points; ``load``, ``load_errors`` in N; ``correlation`` (n, n) of the noise, if stated.
+    points; ``load``, ``load_errors`` in N; ``correlation`` (n, n) of the noise, if stated;
+    ``by_dynamics`` (q, n): change of ``u``, which is that of a still sensor, by one standard
+    uncertainty of each number of the sensor's dynamics, in V.
 
     Examples
     --------
@@ -121,10 +123,11 @@ class MeasuredPoints(ByContent):
     load_errors: FloatArray
     x_errors: FloatArray
     correlation: FloatArray | None = None
+    by_dynamics: FloatArray | None = None
 
     def __post_init__(self) -> None:
         _freeze(self, "weight", "load", "load_errors", "correlation")
-        _freeze(self, "x", "y", "x_errors", "u", "noise", scale=_FILE_SCALE)
+        _freeze(self, "x", "y", "x_errors", "u", "noise", "by_dynamics", scale=_FILE_SCALE)
 
     def __repr__(self) -> str:
         """Return the number of points in place of arrays."""

@@ -449,6 +449,7 @@ def points_record(channel: str) -> Record:
             Quantity("noise", _U, stored=f"{u}_errors"),
         ),
         Quantity("correlation", _ONE, axes=("point", "point_prime"), stored=f"{u}_correlation"),
+        Quantity("by_dynamics", _U, axes=("source", "point"), stored=f"{u}_by_dynamics"),
         signal=u,
     )
 

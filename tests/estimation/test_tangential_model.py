@@ -34,6 +34,7 @@ def planar_points(x, y, channel):
         scan=np.zeros(n, np.intp),
         free=np.array([[True, True]]),
         averaging=np.zeros((1, 2)),
+        velocity=np.zeros(x.size),
         missing=0,
         channel=channel,
     )

@@ -198,7 +198,6 @@ def _with_voltages(scan: Scan, channel: str, voltages: FloatArray) -> Scan:
     """Return the scan with other voltages of a channel at its measured points, shape (n,)."""
     u = np.full(scan.u_zz.shape, np.nan)
     u[measured_mask(scan, channel)] = voltages
-    scan = replace(scan, averaging_length=None)  # they are those at the positions
     if channel == "zz":
         return replace(scan, u_zz=u)
     return replace(scan, channels={**scan.channels, f"u_{channel}": u})

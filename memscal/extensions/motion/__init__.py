@@ -1,0 +1,1 @@
+"""Readings in motion: sliding contacts, sensors that are slow, and creep."""

@@ -1,0 +1,191 @@
+"""Readings in motion against a filter in time: exact recursions and an integrator of the package's
+peer library, on a dense path, not by transforms."""
+
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from scipy.interpolate import CubicSpline
+from scipy.signal import TransferFunction, lsim
+from scipy.special import j0
+
+import memscal
+from memscal.estimation.forward import forward_model
+from memscal.estimation.points import measured_points
+from memscal.estimation.reference_spectra import reference_spectra
+from memscal.extensions.motion.moving_model import changes_by_dynamics
+from memscal.extensions.motion.transfer import transfer
+from memscal.extensions.motion.velocities import velocities
+
+FILM = memscal.ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
+ROD = memscal.Rod(radius=0.25e-3)
+CONTACT = memscal.indent(FILM, ROD, load=1.0, strain="linear")
+WIDTH = 0.561e-3
+CENTRE = 0.14e-3
+SPEED = 1e-3
+X = np.linspace(-12e-3, 12e-3, 241)
+
+DYNAMICS = {
+    "low_pass": memscal.Dynamics(low_pass=0.3),
+    "resonance": memscal.Dynamics(resonance=0.8, quality=2.0),
+    "overdamped": memscal.Dynamics(resonance=0.8, quality=0.4),
+    "creep": memscal.Dynamics(creep_share=0.05, creep_time=1.0),
+    "creep of a record": memscal.Dynamics(creep_share=0.2, creep_time=3.0, creep_record=4.0),
+    "all": memscal.Dynamics(
+        low_pass=0.5, resonance=2.0, quality=3.0, creep_share=0.1, creep_time=2.0
+    ),
+}
+
+
+def systems(dynamics):
+    """Linear systems in time of which the dynamics are made."""
+    if dynamics.low_pass:
+        yield TransferFunction([1.0], [1 / (2 * np.pi * dynamics.low_pass), 1.0])
+    if dynamics.resonance:
+        w = 2 * np.pi * dynamics.resonance
+        yield TransferFunction([w**2], [1.0, w / dynamics.quality, w**2])
+    if dynamics.creep_share:
+        g, tau = dynamics.creep_share, dynamics.creep_time
+        whole = 1 - g * np.exp(-(dynamics.creep_record or np.inf) / tau)
+        yield TransferFunction([(1 - g) * tau / whole, 1 / whole], [tau, 1.0])
+
+
+def in_time(dynamics, u, dt):
+    """What is read of ``u`` at times ``dt`` apart."""
+    time = dt * np.arange(u.size)
+    for system in systems(dynamics):
+        u = lsim(system, u, time)[1]
+    return u
+
+
+def scan_of(dynamics, u=None, x=X, **stated):
+    return memscal.Scan(
+        x=x,
+        u_zz=np.exp(-((x / 1e-3) ** 2)) if u is None else u,
+        load=1.0,
+        indenter=ROD,
+        film=FILM,
+        sensor=memscal.StressSensor(dynamics=dynamics),
+        **stated,
+    )
+
+
+@lru_cache
+def blurred_stress():
+    """Base stress blurred by a Gaussian, by the distance, by an integral of its own."""
+    k = np.linspace(0, 12e3, 6001)
+    values = CONTACT.base_spectrum(k) * np.exp(-((WIDTH * k) ** 2) / 2) * k / (2 * np.pi)
+    r = np.linspace(0.0, 42e-3, 801)
+    return CubicSpline(r, [np.trapezoid(values * j0(k * one), k) for one in r])
+
+
+def still_signal(x):
+    return blurred_stress()(np.abs(x - CENTRE))
+
+
+def model_signal(scan):
+    points = measured_points(scan)
+    model = forward_model(points, reference_spectra([CONTACT], [points]))
+    kernel = np.exp(-((WIDTH * model.k) ** 2) / 2)
+    geometry = model.geometry(np.array([[CENTRE, 0.0]]))
+    return model, geometry, kernel, model.signal(geometry, kernel)
+
+
+@pytest.mark.parametrize("way", [1, -1])
+@pytest.mark.parametrize("name", DYNAMICS)
+def test_a_reading_is_that_of_a_filter_in_time(name, way):
+    dynamics = DYNAMICS[name]
+    scan = scan_of(dynamics, speed=SPEED, sliding_direction=way, motion="sliding")
+    signal = model_signal(scan)[3]
+    path = way * np.arange(-40e-3, 16e-3, 0.01e-3)
+    read = in_time(dynamics, still_signal(path), 0.01)
+    order = np.argsort(path)
+    expected = np.interp(scan.x, path[order], read[order])
+    assert signal == pytest.approx(expected, abs=3e-4 * expected.max())
+
+
+def test_a_mean_along_the_scan_is_the_mean_of_the_still_signal():
+    scan = scan_of(None, averaging_length=0.8e-3)
+    signal = model_signal(scan)[3]
+    ends = still_signal(np.linspace(-13e-3, 13e-3, 2601))
+    fine = np.linspace(-13e-3, 13e-3, 2601)
+    integral = np.concatenate([[0.0], np.cumsum((ends[1:] + ends[:-1]) / 2 * np.diff(fine))])
+    upper = np.interp(scan.x + 0.4e-3, fine, integral)
+    lower = np.interp(scan.x - 0.4e-3, fine, integral)
+    assert signal == pytest.approx((upper - lower) / 0.8e-3, abs=1e-4 * ends.max())
+
+
+def test_the_slopes_are_those_of_moved_centres():
+    scan = scan_of(DYNAMICS["low_pass"], speed=SPEED)
+    model, geometry, kernel, _ = model_signal(scan)
+    slopes = model.shift_derivative(geometry, kernel)[0]
+    step = 1e-6
+    ends = [
+        model.signal(model.geometry(np.array([[CENTRE + side * step, 0.0]])), kernel)
+        for side in (1, -1)
+    ]
+    assert slopes == pytest.approx((ends[0] - ends[1]) / (2 * step), abs=1e-4 * slopes.max())
+
+
+def test_every_row_of_a_raster_is_read_as_a_line():
+    y = np.array([-1e-3, 0.0, 1e-3, 2e-3])
+    u = np.exp(-((X / 1e-3 - y[:, None] / 1e-3) ** 2))
+    signal = model_signal(scan_of(DYNAMICS["low_pass"], u=u, y=y, speed=SPEED))[3]
+    line = model_signal(scan_of(DYNAMICS["low_pass"], speed=SPEED))[3]
+    assert signal.reshape(4, -1)[1] == pytest.approx(line, abs=1e-6 * line.max())
+    assert signal.reshape(4, -1)[0] == pytest.approx(signal.reshape(4, -1)[2])
+
+
+def test_a_sensor_at_rest_or_at_low_speed_reads_the_still_signal():
+    plain = model_signal(scan_of(None))[3]
+    slow = scan_of(DYNAMICS["low_pass"], speed=1e-8)
+    held = scan_of(DYNAMICS["low_pass"], speed=SPEED, dwell_time=1.0)
+    for scan in (slow, held):
+        assert model_signal(scan)[3] == pytest.approx(plain, abs=1e-5 * plain.max())
+
+
+@pytest.mark.parametrize("name", DYNAMICS)
+def test_a_step_is_read_in_full_at_the_end_of_the_record(name):
+    """The step response by the inverse transform of H, and by the systems in time."""
+    dynamics = DYNAMICS[name]
+    time = dynamics.creep_record or 60.0
+    end = in_time(dynamics, np.ones(200_001), time / 200_000)[-1]
+    assert end == pytest.approx(1.0, abs=2e-4)
+
+    def density(f):
+        return 2 * transfer(dynamics, np.array(f)).real * np.sin(2 * np.pi * f * 0.7) / (np.pi * f)
+
+    # s(t) = 2/pi int Re H(f) sin(2 pi f t)/f df of a causal system.
+    step, _ = quad(density, 0.0, 400.0, limit=4000)
+    read = in_time(dynamics, np.ones(70_001), 1e-5)[-1]
+    assert step == pytest.approx(read, abs=3e-3)
+
+
+def test_velocities_follow_the_times_the_speed_and_the_direction():
+    x = np.linspace(0, 10e-3, 101)
+    time = np.concatenate([x / 2e-3, 6 + (10e-3 - x) / 5e-3])
+    both = scan_of(
+        None, u=np.arange(202.0), x=np.tile(x, 2), repeat=np.repeat([0, 1], 101), time=time
+    )
+    assert velocities(both)[:101] == pytest.approx(2e-3)
+    assert velocities(both)[101:] == pytest.approx(-5e-3)
+    assert velocities(scan_of(None, x=x[::-1], speed=1e-3)) == pytest.approx(-1e-3)
+    sliding = scan_of(None, x=x, speed=1e-3, motion="sliding", sliding_direction=-1)
+    assert velocities(sliding) == pytest.approx(-1e-3)
+    gap = replace(both, time=np.where(np.arange(202) == 50, np.nan, time))
+    assert velocities(gap)[50] == 0.0
+    assert velocities(gap)[:50] == pytest.approx(2e-3)
+
+
+def test_uncertain_dynamics_count_by_their_derivative():
+    scan = scan_of(replace(DYNAMICS["low_pass"], low_pass_uncertainty=0.02), speed=SPEED)
+    changes = changes_by_dynamics(*model_signal(scan)[:3])
+    faster, slower = (
+        model_signal(scan_of(memscal.Dynamics(low_pass=fc), speed=SPEED))[3] for fc in (0.31, 0.29)
+    )
+    assert [*changes] == ["low_pass"]
+    assert changes["low_pass"] == pytest.approx(
+        faster - slower, abs=1e-3 * abs(faster - slower).max()
+    )
