@@ -339,6 +339,7 @@ def measured_points(scan: Scan, channel: str = "zz") -> ScanPoints:
     count = keep.sum()
     along = [scan.direction == "x", scan.direction == "y"]
     first = np.zeros(count, np.intp)
+    velocity = hook("velocities")(scan) if scan.sensor.dynamics else np.zeros(u.shape)
     points = ScanPoints(
         x=x[keep],
         y=y[keep],
@@ -353,7 +354,7 @@ def measured_points(scan: Scan, channel: str = "zz") -> ScanPoints:
         scan=first,
         free=np.array([[along[0], along[1] or scan.planar]]),
         averaging=np.array([along]) * (scan.averaging_length or 0.0),
-        velocity=_velocities(scan)[keep],
+        velocity=velocity[keep],
         missing=u.size - count,
         decorrelation=None if correlation is None else _decorrelation(correlation, keep),
         channel=channel,
@@ -362,14 +363,6 @@ def measured_points(scan: Scan, channel: str = "zz") -> ScanPoints:
     )
     _require_usable(points)
     return points
-
-
-def _velocities(scan: Scan) -> FloatArray:
-    """Return the velocity at each reading, in m/s; zero where no dynamics are stated."""
-    if scan.sensor.dynamics is None:
-        return np.zeros(scan.shape)
-    velocity: FloatArray = hook("velocities")(scan)
-    return velocity
 
 
 #: Standard deviation of a baseline's curvature, edge to centre, over the largest signal, where none
