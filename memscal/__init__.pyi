@@ -31,6 +31,8 @@ from .extensions.interface_laws.results import InterfaceComparison as InterfaceC
 from .extensions.monte_carlo.monte_carlo import MonteCarlo as MonteCarlo
 from .extensions.monte_carlo.monte_carlo import monte_carlo as monte_carlo
 from .extensions.monte_carlo.sweep import Sweep as Sweep
+from .extensions.motion.slide import slide as slide
+from .extensions.motion.sliding_contact import SlidingContact as SlidingContact
 from .extensions.planning.design import Design as Design
 from .extensions.planning.design import Plan as Plan
 from .extensions.planning.design import design as design

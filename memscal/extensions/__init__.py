@@ -80,6 +80,10 @@ VIEWS = {
         "extensions.response.summary",
         "extensions.response.figure.response_figure",
     ),
+    "SlidingContact": (
+        "extensions.motion.sliding_summary",
+        "extensions.motion.sliding_figure.sliding_figure",
+    ),
     "Sweep": (
         "extensions.monte_carlo.sweep_summary",
         "extensions.monte_carlo.sweep_figure.sweep_figure",
@@ -141,6 +145,8 @@ PUBLIC = {
     "extensions.interface_laws.results": ["InterfaceComparison"],
     "extensions.monte_carlo.monte_carlo": ["MonteCarlo", "monte_carlo"],
     "extensions.monte_carlo.sweep": ["Sweep"],
+    "extensions.motion.slide": ["slide"],
+    "extensions.motion.sliding_contact": ["SlidingContact"],
     "extensions.planning.design": ["Design", "Plan", "design"],
     "extensions.response.response": ["Response", "response"],
     "extensions.simulation.disturbances": ["Disturbances"],

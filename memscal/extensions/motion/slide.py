@@ -1,0 +1,226 @@
+r"""Contact of an indenter that slides on a bonded film: the entry point, and its solution.
+
+Under full sliding the shear is :math:`q = \mu p` along x everywhere, so that only the pressure is
+unknown.  With the film's transfer functions W and X (:mod:`memscal.mechanics.film_response`) the
+surface is depressed by
+
+.. math::
+
+    \hat w = \frac{1-\nu}{Gk} (W + i\mu\cos\varphi\,X)\,\hat p,
+
+:math:`\varphi` being the angle between wave vector and x.  Where there is pressure the film lies on
+the indenter; elsewhere it lies below.  Both hold at the centres of square cells, and the pressure
+has no shorter waves than they resolve.  The influence of one cell is summed over a period of which
+nothing is seen in the contact, for it falls off as :math:`e^{-0.74 r/h}` or faster, and is applied
+by zero-padded FFT.
+
+The coupling X, which makes the influence unsymmetric, is part of every step: in a set of cells in
+contact pressure and depth are solved for by GMRES, and the set is corrected (cells in tension
+leave, cells that would pass through the indenter enter) until it stays, after three to six steps.
+An antisymmetric influence does no work: the problem is as definite as that without friction.
+"""
+
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+import scipy.fft
+from scipy.sparse.linalg import LinearOperator, gmres
+
+from memscal.errors import ConvergenceError, DomainError, InputError
+from memscal.extensions.motion.sliding_contact import Region, SlidingContact
+from memscal.mechanics.film_response import corrections, half_space_coupling
+from memscal.mechanics.indent import indent
+from memscal.model.arrays import FloatArray, floats
+from memscal.model.film import ElasticFilm
+from memscal.model.indenter import Indenter, Rod
+from memscal.parallel import single_threaded
+
+#: Cells across the window, until the base stress changes by less than this share of its peak.
+_CELLS = (32, 64, 128, 256, 512)
+_CHANGE = 5e-4
+#: A smaller contact, in thicknesses, is that of a half-space.
+_LEAST_RADIUS = 0.05
+#: The window is so much wider than the contact from which it starts; the first one is so many
+#: radii of the contact without friction, to either side.
+_MARGIN = 1.1
+_FIRST_WINDOW = 2.0
+#: Sets of cells in contact that are tried, tolerance in depths, and vectors that GMRES keeps.
+_SETS = 60
+_TOLERANCE = 1e-6
+_KEPT = 60
+#: Images of a cell are so much farther away than the window is wide, in thicknesses.
+_BETWEEN_IMAGES = 10.0
+#: In place of k = 0, where the compliance has a limit, in rad/h over 2 pi.
+_SMALLEST = 1e-4
+
+
+@single_threaded()
+def slide(
+    film: ElasticFilm,
+    indenter: Indenter,
+    *,
+    load: float,
+    friction: float,
+    direction: float = 1.0,
+    points: int | None = None,
+) -> SlidingContact:
+    r"""Slide a rigid indenter over a bonded film.
+
+    The shear is :math:`q = \mu p` in the whole contact, along the way of the indenter.  Elasticity
+    is linear, whatever the film's law.
+
+    Parameters
+    ----------
+    film, indenter : ElasticFilm, Indenter
+        The film, bonded to a rigid base, and a Sphere, Cone or Profile.
+    load : float
+        Normal load in N.
+    friction : float
+        Shear over pressure :math:`\mu`, from 0 upward.
+    direction : float
+        +1 where the indenter moves to larger x on the film, -1 to smaller.
+    points : int, optional
+        Cells across the contact, in each direction.  By default 32, doubled until the base stress
+        changes by less than 5e-4 of its largest, 512 at the most; ``convergence`` states by how
+        much it did.
+
+    Returns
+    -------
+    SlidingContact
+        Pressure, depth, and the normal stress at the base.
+
+    Raises
+    ------
+    InputError
+        If an argument makes no sense, or the indenter is a rod.
+    DomainError
+        If the contact outgrows the indenter's known face or is far smaller than the film is thick,
+        or the indenter would pass through the film.
+    ConvergenceError
+        If the contact does not settle.
+
+    Examples
+    --------
+    >>> import memscal
+    >>> film = memscal.ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
+    >>> contact = memscal.slide(film, memscal.Sphere(radius=128.8e-3), load=1.37, friction=0.3)
+    >>> print(f"{contact.tangential_load:.3f} N, largest {contact.max_base_stress / 1e3:.1f} kPa")
+    0.411 N, largest 68.5 kPa
+    """
+    if isinstance(indenter, Rod):
+        raise InputError(
+            "A rod is given, but only indenters with a smooth face slide here.",
+            why="At a rod's edge the pressure has no largest value, and where the film slides "
+            "over the edge depends on how sharp that is.",
+            cure="Give a Sphere, Cone or Profile.",
+        )
+    if not 0 <= friction < np.inf or abs(direction) != 1:
+        raise InputError(
+            f"The friction is {friction:g}, and the direction {direction:g}.",
+            cure="Give shear over pressure, from 0 upward, and +1 or -1.",
+        )
+    radius = indent(film, indenter, load=load, strain="linear").contact_radius
+    if radius < _LEAST_RADIUS * film.thickness:
+        raise DomainError(
+            f"The contact has a radius of {radius * 1e6:.3g} um on a film of "
+            f"{film.thickness * 1e6:.4g} um.",
+            why="To such a contact the film is a half-space: at its base there is a point force.",
+            cure="Give more load, or a thinner film.",
+        )
+    solve = partial(solve_sliding, film, indenter, load, direction * friction)
+    window = _FIRST_WINDOW * radius
+    contact = solve(Region(-window, window, window))
+    for cells in [points] if points else _CELLS:
+        finer = solve(contact.region, cells)
+        change = abs(finer.base_stress(finer.x) - contact.base_stress(finer.x)).max()
+        contact = replace(finer, convergence=float(change / finer.max_base_stress))
+        if contact.convergence < _CHANGE:
+            break
+    if np.abs(contact.region).max() > indenter.extent:
+        raise DomainError(
+            f"Under {load:g} N the contact outgrows the {indenter.shape}'s known face, of a "
+            f"radius of {indenter.extent * 1e3:.4g} mm.",
+            cure="Give the face farther out, or less load.",
+        )
+    return contact
+
+
+def solve_sliding(
+    film: ElasticFilm,
+    indenter: Indenter,
+    load: float,
+    friction: float,
+    start: Region,
+    cells: int = _CELLS[0],
+) -> SlidingContact:
+    """Return the contact on so many cells across a window, without its convergence.
+
+    ``friction`` is the shear along x over the pressure, of either sign; ``start`` the region of a
+    contact like it: the window is wider by a tenth.
+    """
+    # Lengths are in thicknesses here, stresses in Young's modulus.
+    h = film.thickness
+    low, high, half_width = np.array(start) / h
+    step = _MARGIN / cells * max(high - low, 2 * half_width)
+    y = step * (np.arange(cells) - (cells - 1) / 2)
+    x = y + (low + high) / 2
+    heights = indenter.height(h * np.hypot.outer(y, x)) / h
+    total = load / (film.young_modulus * h**2 * step**2)
+    influence = scipy.fft.rfft2(_influence(step, cells, film.poisson_ratio, friction))
+    padded = (2 * cells, 2 * cells)
+    inside = (np.hypot.outer(y, y) < y[-1]) & np.isfinite(heights)
+    pressure = np.zeros_like(heights)
+    unknown = np.zeros(1)  # the depth, and pressures on the cells inside of the contact
+
+    def film_under(unknown: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return pressures, and how far they depress the film below the depth."""
+        pressure = np.zeros_like(heights)
+        pressure[inside] = unknown[1:]
+        waves = influence * scipy.fft.rfft2(pressure, padded)
+        return pressure, scipy.fft.irfft2(waves, padded)[:cells, :cells] - unknown[0]
+
+    def balance(unknown: FloatArray) -> FloatArray:
+        return np.append(unknown[1:].mean(), film_under(unknown)[1][inside])
+
+    for _ in range(_SETS):
+        guess = np.append(unknown[0], pressure[inside])
+        operator = LinearOperator((guess.size, guess.size), balance, dtype=guess.dtype)
+        sides = np.append(total / inside.sum(), -heights[inside])
+        unknown, _ = gmres(operator, sides, guess, rtol=_TOLERANCE / 10, restart=_KEPT)
+        pressure, depressed = film_under(unknown)
+        passing = depressed + heights < -_TOLERANCE * unknown[0]
+        lying = np.where(inside, pressure > 0, passing)
+        # A contact at the rim of the window never settles.
+        if np.array_equal(lying, np.pad(inside[1:-1, 1:-1], 1)):
+            return SlidingContact(
+                film=film,
+                indenter=indenter,
+                load=load,
+                friction=friction,
+                x=h * x,
+                y=h * y,
+                pressure=film.young_modulus * pressure,
+                depth=h * float(unknown[0]),
+            )
+        inside = lying
+    raise ConvergenceError(
+        f"The contact that slides with friction {friction:g} did not settle.",
+        why=f"It may reach beyond {step * cells:.3g} thicknesses, where it is sought.",
+        cure="Give more points, or less friction.",
+    )
+
+
+def _influence(step: float, cells: int, poisson_ratio: float, friction: float) -> FloatArray:
+    """Depression by a pressure on the first cell and its shear, at lags up to ``cells``."""
+    count = scipy.fft.next_fast_len(2 * cells + int(_BETWEEN_IMAGES / step), real=True)
+    along_x = scipy.fft.rfftfreq(count, step)
+    along_y = scipy.fft.fftfreq(count, step)
+    frequency = np.hypot.outer(along_y, along_x)
+    frequency[0, 0] = _SMALLEST
+    normal, coupling, _ = corrections(2 * np.pi * frequency, poisson_ratio)
+    by_shear = friction * along_x / frequency * (half_space_coupling(poisson_ratio) + coupling)
+    # (1 - nu)/G in units of 1/E.
+    spectrum = (1 - poisson_ratio**2) / np.pi / frequency * (1 + normal + 1j * by_shear)
+    lags = np.r_[0:cells, -cells:0]
+    return floats(scipy.fft.irfft2(spectrum, (count, count))[np.ix_(lags, lags)])
