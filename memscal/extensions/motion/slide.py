@@ -167,46 +167,54 @@ def solve_sliding(
     x = y + (low + high) / 2
     heights = indenter.height(h * np.hypot.outer(y, x)) / h
     total = load / (film.young_modulus * h**2 * step**2)
-    influence = scipy.fft.rfft2(_influence(step, cells, film.poisson_ratio, friction))
-    padded = (2 * cells, 2 * cells)
-    inside = (np.hypot.outer(y, y) < y[-1]) & np.isfinite(heights)
+    influence = _influence(step, cells, film.poisson_ratio, friction)
+    pressure, depth = _balanced(heights, influence, total)
+    return SlidingContact(
+        film=film,
+        indenter=indenter,
+        load=load,
+        friction=friction,
+        x=h * x,
+        y=h * y,
+        pressure=film.young_modulus * pressure,
+        depth=h * depth,
+    )
+
+
+def _balanced(heights: FloatArray, influence: FloatArray, total: float) -> tuple[FloatArray, float]:
+    """Return pressures of a total on the cells of a window that an indenter touches, and depth."""
+    cells = len(heights)
+    padded = influence.shape
+    waves = scipy.fft.rfft2(influence)
+    inside = np.isfinite(heights)
     pressure = np.zeros_like(heights)
     unknown = np.zeros(1)  # the depth, and pressures on the cells inside of the contact
 
-    def film_under(unknown: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def pressed(unknown: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return pressures, and how far they depress the film below the depth."""
         pressure = np.zeros_like(heights)
         pressure[inside] = unknown[1:]
-        waves = influence * scipy.fft.rfft2(pressure, padded)
-        return pressure, scipy.fft.irfft2(waves, padded)[:cells, :cells] - unknown[0]
+        depressed = scipy.fft.irfft2(waves * scipy.fft.rfft2(pressure, padded), padded)
+        return pressure, depressed[:cells, :cells] - unknown[0]
 
     def balance(unknown: FloatArray) -> FloatArray:
-        return np.append(unknown[1:].mean(), film_under(unknown)[1][inside])
+        return np.append(unknown[1:].mean(), pressed(unknown)[1][inside])
 
     for _ in range(_SETS):
         guess = np.append(unknown[0], pressure[inside])
         operator = LinearOperator((guess.size, guess.size), balance, dtype=guess.dtype)
         sides = np.append(total / inside.sum(), -heights[inside])
         unknown, _ = gmres(operator, sides, guess, rtol=_TOLERANCE / 10, restart=_KEPT)
-        pressure, depressed = film_under(unknown)
+        pressure, depressed = pressed(unknown)
         passing = depressed + heights < -_TOLERANCE * unknown[0]
         lying = np.where(inside, pressure > 0, passing)
         # A contact at the rim of the window never settles.
         if np.array_equal(lying, np.pad(inside[1:-1, 1:-1], 1)):
-            return SlidingContact(
-                film=film,
-                indenter=indenter,
-                load=load,
-                friction=friction,
-                x=h * x,
-                y=h * y,
-                pressure=film.young_modulus * pressure,
-                depth=h * float(unknown[0]),
-            )
+            return pressure, float(unknown[0])
         inside = lying
     raise ConvergenceError(
-        f"The contact that slides with friction {friction:g} did not settle.",
-        why=f"It may reach beyond {step * cells:.3g} thicknesses, where it is sought.",
+        "The sliding contact did not settle.",
+        why="It may reach beyond the window in which it is sought.",
         cure="Give more points, or less friction.",
     )
 

@@ -1,0 +1,117 @@
+"""Sliding contacts against closed forms, contacts at rest, and influences by Hankel transforms."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import memscal
+from memscal.extensions.motion.slide import solve_sliding
+
+H = 2e-3
+FILM = memscal.ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=H)
+SPHERE = memscal.Sphere(radius=128.8e-3)
+POINTS = np.linspace(-8e-3, 8e-3, 161)
+
+
+def film(nu):
+    return replace(FILM, poisson_ratio=nu)
+
+
+def slid(friction, nu=0.5, **options):
+    return memscal.slide(film(nu), SPHERE, load=1.37, friction=friction, **options)
+
+
+@pytest.mark.parametrize("load", [0.05, 1.37, 10.0])
+@pytest.mark.parametrize("nu", [0.3, 0.5])
+def test_without_friction_it_is_the_contact_at_rest(nu, load):
+    contact = memscal.slide(film(nu), SPHERE, load=load, friction=0.0)
+    still = memscal.indent(film(nu), SPHERE, load=load)
+    expected = still.base_stress(abs(POINTS))
+    assert contact.base_stress(POINTS) == pytest.approx(expected, abs=1e-3 * expected.max())
+    assert contact.depth == pytest.approx(still.depth, rel=1e-3)
+    assert contact.region == pytest.approx(still.contact_radius * np.array([-1, 1, 1]), rel=0.01)
+    assert 1e-5 < contact.convergence < 1e-3
+
+
+@pytest.mark.parametrize("nu", [0.0, 0.3, 0.45, 0.5])
+def test_forces_and_moments_balance(nu):
+    contact = slid(0.4, nu)
+    x = np.linspace(-30e-3, 30e-3, 601)
+    cell = (x[1] - x[0]) ** 2
+    stress = contact.base_stress(x, x[:, None])
+    assert stress.sum() * cell == pytest.approx(1.37, rel=1e-4)
+    centroid = (stress @ x).sum() * cell / 1.37
+    assert centroid - contact.surface_centroid == pytest.approx(0.4 * H, rel=1e-3)
+    assert contact.base_centroid == pytest.approx(centroid, abs=1e-3 * H)
+    assert contact.base_spectrum(0.0, 0.0) == pytest.approx(1.37, rel=1e-5)
+    assert contact.tangential_load == pytest.approx(0.4 * 1.37)
+
+
+def test_a_sphere_with_friction_of_the_film_in_the_paper():
+    # Measured with a solver of its own on a grid of 0.05 mm: mm from the sphere's lowest point.
+    contact = slid(0.3)
+    assert contact.surface_centroid == pytest.approx(0.19e-3, abs=0.01e-3)
+    assert contact.region[:2] == pytest.approx([-2.72e-3, 3.00e-3], abs=0.05e-3)
+    assert contact.max_base_stress / slid(0.0).max_base_stress == pytest.approx(1.009, abs=1e-3)
+    assert 0.4e-3 < contact.peak_position < 0.6e-3
+
+
+def test_the_error_falls_faster_than_the_cells_become_smaller():
+    region = slid(0.5).region
+    fine = solve_sliding(FILM, SPHERE, 1.37, 0.5, region, 200).base_stress(POINTS)
+    errors = []
+    for cells in (16, 32, 64):
+        stress = solve_sliding(FILM, SPHERE, 1.37, 0.5, region, cells).base_stress(POINTS)
+        errors.append(abs(stress - fine).max() / fine.max())
+    assert errors[1] < 1e-3
+    assert errors[2] < errors[0] / 4**1.5
+
+
+def test_the_other_way_is_the_mirror_image():
+    forth = slid(0.6, 0.4)
+    back = slid(0.6, 0.4, direction=-1)
+    scale = forth.max_base_stress
+    assert back.base_stress(-POINTS) == pytest.approx(forth.base_stress(POINTS), abs=1e-4 * scale)
+    assert back.tangential_load == -forth.tangential_load
+    k = np.linspace(0.0, 3e3, 7)
+    there = forth.base_spectrum(k, 500.0)
+    assert back.base_spectrum(k, 500.0) == pytest.approx(there.conj(), abs=1e-4 * 1.37)
+    assert back.base_spectrum(-k, 500.0) == pytest.approx(there, abs=1e-4 * 1.37)
+
+
+def hamilton(x, y, z, a):
+    """Normal stress below a sliding sphere over the pressure, and over the shear, of load one.
+
+    Hamilton, Proc. IMechE C 197 (1983) 53; compression positive, z into the half-space.
+    """
+    r2 = x**2 + y**2
+    across = r2 + z**2 - a**2
+    s = np.hypot(across, 2 * a * z)
+    m = np.sqrt((s + across) / 2)
+    n = np.sqrt((s - across) / 2)
+    scale = 3 / (2 * np.pi * a**3)
+    by_shear = -z * x * n / (2 * r2) * (1 - (r2 + z**2 + a**2) / s)
+    return scale * (n - a * z * m / s), scale * by_shear
+
+
+def test_on_a_thick_film_it_is_a_hertz_contact_with_its_shear():
+    # Compared is the stress below the surface of a half-space under the tractions of a contact on
+    # a film that is ten radii thick: the stress at the base of a bonded film is another one.
+    thick = replace(FILM, thickness=20e-3)
+    load = 4 / 3 * thick.contact_modulus * 2e-3**3 / SPHERE.radius
+    contact = memscal.slide(thick, SPHERE, load=load, friction=0.5)
+    a = contact.region.half_width
+    assert a == pytest.approx(2e-3, rel=0.02)
+    assert contact.pressure.max() == pytest.approx(1.5 * load / (np.pi * a**2), rel=0.02)
+    x = np.array([-2.0, -1.0, 0.4, 1.0, 2.0]) * a
+    z = 0.7 * a
+    offset = x[:, None, None] - contact.x
+    distance = np.sqrt(offset**2 + contact.y[:, None] ** 2 + z**2)
+    # Boussinesq and Cerruti: both are 3 z^2/(2 pi R^5) times the force along R.
+    along = contact.pressure * (z + 0.5 * offset)
+    cell = (contact.x[1] - contact.x[0]) ** 2
+    stress = (1.5 / np.pi * z**2 * cell * along / distance**5).sum(axis=(1, 2))
+    by_pressure, by_shear = hamilton(x, 0.0, z, a)
+    expected = load * (by_pressure + 0.5 * by_shear)
+    assert stress == pytest.approx(expected, abs=0.01 * expected.max())
