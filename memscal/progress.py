@@ -15,7 +15,7 @@ from functools import wraps
 from html import escape
 from inspect import signature
 from time import monotonic
-from typing import Any, Literal, TypeAlias, TypeVar, cast
+from typing import Any, Literal, TypeAlias, TypedDict, TypeVar, cast
 
 from memscal.errors import require_names
 
@@ -85,6 +85,13 @@ class Progress:
 _Hears = Callable[[Progress], None]
 Listener: TypeAlias = _Hears | Literal[True] | None
 """What is told of progress: a callback, or ``True`` for a bar; ``None`` for what is told now."""
+
+
+class Watched(TypedDict, total=False):
+    """What a function of many arguments has by :func:`reported`."""
+
+    progress: Listener
+
 
 _LISTENER: ContextVar[_Hears | None] = ContextVar("listener", default=None)
 _STEPS: ContextVar["tuple[Task, Sequence[str]] | None"] = ContextVar("steps", default=None)

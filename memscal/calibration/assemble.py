@@ -128,6 +128,7 @@ def _configuration(
         "film_law": request.film_law,
         "rod_friction": request.rod_friction,
         "centre": centre,
+        "creep": request.creep,
         "override": prepared.overridden or None,
         "correlations": {" ".join(pair): c for pair, c in request.correlations.items()} or None,
         "grid": solution.choice.reasons,

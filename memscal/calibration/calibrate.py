@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import field, replace
 from os import PathLike
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, Unpack
 
 from memscal.apparatus import ApparatusFunction
 from memscal.calibration.assemble import assemble
@@ -41,7 +41,7 @@ from memscal.model.result import Result
 from memscal.model.scan import Scan
 from memscal.model.sizes import MOST_OF_LINES
 from memscal.parallel import single_threaded
-from memscal.progress import Listener, done_with, in_steps, reported
+from memscal.progress import Watched, done_with, in_steps, reported
 
 if TYPE_CHECKING:
     from memscal import Sweep
@@ -141,12 +141,13 @@ def calibrate(
     pixel_size: float | None = None,
     free: Literal["thickness"] | Sequence[Literal["thickness"]] = (),
     noise_record: Scan | str | PathLike[str] | None = None,
+    creep: Any = None,
     seed: int = 0,
     override: bool = False,
     accept_altered: bool = False,
     relative: bool = False,
     other: bool = True,
-    progress: Listener = None,  # noqa: ARG001 - @reported
+    **progress: Unpack[Watched],  # noqa: ARG001 - @reported
 ) -> Calibration:
     r"""Find the apparatus function of a sensor from a rod scan, or from several.
 
@@ -203,6 +204,9 @@ def calibrate(
     noise_record : Scan or path, optional
         Readings of the sensor at rest (``memscal import --noise-record``), whose noise, in size and
         correlation, the scans' readings have at their times, in place of a stated one.
+    creep : path, optional
+        Creep of the sensor that ``memscal creep`` has found, or its file, for scans made in motion:
+        A and G are then those at the end of its dwell record.
     seed : int, default 0
         Seed of methods that draw random numbers.
     override : bool, default False
@@ -255,6 +259,7 @@ def calibrate(
         override=override,
         accept_altered=accept_altered,
         relative=relative,
+        creep=creep,
     )
     prepared = prepare(scans, request)
     with naming_ceiling(prepared.scans, channel):

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import chain
 from os import PathLike
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from memscal.estimation.set_up import (
     require_same_set_up,
     with_film_of,
 )
+from memscal.extensions import hook
 from memscal.mechanics.contact import BaseStress, Contact, stress_table
 from memscal.mechanics.press_rod import press_rod
 from memscal.model.arrays import array_record, keyword_array_record
@@ -65,6 +66,7 @@ class Request:
     override: bool
     accept_altered: bool
     relative: bool
+    creep: Any = None  # of the sensor, or its file; as it is taken, what tells that file
 
 
 @array_record
@@ -90,6 +92,8 @@ def prepare(as_stated: Sequence[Scan], request: Request) -> Prepared:
             f"There is no choice of centre {request.centre!r}.",
             cure=f"Give {COMMON!r} or {PER_REPEAT!r}, or leave it out.",
         )
+    if request.creep is not None:
+        as_stated, request = hook("with_creep")(as_stated, request)
     require_size(as_stated)
     if request.reference is None:
         as_stated = tuple(chain(*map(crossed_lines, as_stated)))
@@ -105,8 +109,7 @@ def prepare(as_stated: Sequence[Scan], request: Request) -> Prepared:
         scan = _with_law(scan, given, request)
         stated.append(given or scan.reference)
         if request.relative:
-            # A rod that has to be solved keeps its nominal load.
-            load = None if stated[-1] else scan.load
+            load = None if stated[-1] else scan.load  # a rod that has to be solved keeps it
             scan = replace(
                 scan, load=load, load_uncertainty=None, normal_load=None, normal_load_errors=None
             )
@@ -123,8 +126,7 @@ def prepare(as_stated: Sequence[Scan], request: Request) -> Prepared:
     require_one_kind(stated, alternatives or ())
     owners: Sequence[int] | None = None
     if not any(stated) and any(s.set_up.film.law != LINEAR for s in scans):
-        # Under another law than the linear one each load has a stress of its own shape.
-        scans, owners = scans_by_load(scans)
+        scans, owners = scans_by_load(scans)  # whose stresses have shapes of their own
         references = [None] * len(scans)
     stresses = list(map(reference_profile, scans, references))
     peak = None

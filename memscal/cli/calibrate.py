@@ -128,6 +128,7 @@ Examples:
   memscal calibrate scan.h5 --method tikhonov --option amplitude=0.5
   memscal calibrate scan.h5 --method bayesian --monte-carlo 1000
   memscal calibrate scan.h5 --channel xz
+  memscal calibrate fast_scan.h5 --creep creep.h5
   memscal calibrate array_scan.h5 -o array.h5 --kernel auto --crosstalk nearest
 """
 
@@ -185,6 +186,9 @@ calibration_options = options_of(
         "the rule chooses). May be repeated."
     ),
     option("--seed", click.IntRange(min=0), metavar="N")("Seed of random numbers.  [default: 0]"),
+    option("--creep", FILE)(
+        "Creep of the sensor (memscal creep), by which a scan made in motion is corrected."
+    ),
     option("--override", is_flag=True)(
         "Go on although a reference is of another film, rod or load than its scan: recorded."
     ),
@@ -309,8 +313,9 @@ def command(
     output = output or out.default_name(scans[0], ending)
     settings = calibration_settings(reference=reference, alternative=alternative, **settings)
     data = _read(scans, reference, noise_record, settings)
+    inputs = [*scans, reference, alternative, noise_record, settings["creep"]]
     outputs = list(filter(None, (output, report, *figures, sweep_figure)))
-    out.prove_writable(outputs, force=force, inputs=[*scans, reference, alternative, noise_record])
+    out.prove_writable(outputs, force=force, inputs=inputs)
     if dry_run:
         _rehearse(data, settings, outputs, as_json)
         return DONE

@@ -34,6 +34,10 @@ COMMANDS = {
         "extensions.response.command",
         "Find which waves of pressure a sensor resolves, and how small ones.",
     ),
+    "creep": (
+        "extensions.motion.creep_command",
+        "Find a sensor's creep from its readings while an indenter rests on it.",
+    ),
     "history": (
         "extensions.history.command",
         "Say whether a sensor has changed since its last calibrations.",
@@ -68,6 +72,10 @@ VIEWS = {
     ),
     "Contacts": ("extensions.arrays.contacts_summary", ""),
     "SensorArray": ("extensions.arrays.summary", "extensions.arrays.figure.array_figure"),
+    "Creep": (
+        "extensions.motion.creep_summary",
+        "extensions.motion.creep_figure.creep_figure",
+    ),
     "Design": ("extensions.planning.summary", "extensions.planning.figure.design_figure"),
     "History": ("extensions.history.summary", "extensions.history.figure.history_figure"),
     "FleetResults": ("extensions.fleet.results_summary", "extensions.fleet.figure.fleet_figure"),
@@ -128,12 +136,16 @@ HOOKS = {
     "table_of": "summaries.table",
     "sweep_noise": "extensions.monte_carlo.sweep",
     "velocities": "extensions.motion.velocities",
+    "with_creep": "extensions.motion.creep",
     "with_drawn_in": "extensions.meshes.mesh_files",
     "write_mesh": "extensions.meshes.mesh_files",
 }
 """Function by which a room calls what stands above it, or an extension: its module."""
 
-FILES = {"memscal-array": "extensions.arrays.files"}
+FILES = {
+    "memscal-array": "extensions.arrays.files",
+    "memscal-creep": "extensions.motion.creep",
+}
 """Schema of an extension's files: the module with their reader, ``read_open``, and ``LAYOUT``."""
 
 PUBLIC = {

@@ -82,6 +82,11 @@ def read_scan(path: FilePath, *, accept_altered: bool = False) -> Scan:
 def scan_from(file: SafeFile, most: int | None = None) -> Scan:
     """Read the scan of an open memscal-scan file; one of more than ``most`` points is refused."""
     require_schema(file, writer.SCAN_SCHEMA)
+    return scan_in(file, most)
+
+
+def scan_in(file: SafeFile, most: int | None = None) -> Scan:
+    """Read the scan that an open file holds, whatever its schema is."""
     if most is not None:
         size = file.claimed_number(_SIGNAL)
         if size > most:
@@ -94,8 +99,11 @@ def scan_from(file: SafeFile, most: int | None = None) -> Scan:
     film, indenter = groups.read_stated(file)
     reading = reading_of(file.units_of(_SIGNAL) or "V", file.where(_SIGNAL))
     if file.attribute(_DATA, "axes") in ("time", ("time",)):
+        # Under an indenter it is a dwell record, else a noise record.
         return Scan(
-            **_read_rest(file, _DATA, reading),
+            **(load | _read_rest(file, _DATA, reading)),
+            indenter=indenter,
+            film=film,
             **groups.read_circumstances(file),
             title=file.optional_text("/entry/title"),
             notes=file.optional_text("/entry/notes/data"),
@@ -204,14 +212,17 @@ def write_scan(scan: Scan, path: FilePath, *, overwrite: bool = False) -> None:
     ...     read_scan(f"{folder}/scan.h5").kind
     'line'
     """
-    writer.write_tree(writer.file_tree(writer.SCAN_SCHEMA, _entry(scan)), path, overwrite=overwrite)
+    writer.write_tree(
+        writer.file_tree(writer.SCAN_SCHEMA, scan_entry(scan)), path, overwrite=overwrite
+    )
 
 
-def _entry(scan: Scan) -> Group:
+def scan_entry(scan: Scan) -> Group:
+    """Return the entry of a file that holds a scan."""
     children: Nodes = {"title": scan.title} if scan.title else {}
     children |= groups.circumstances(scan)
     children["data"] = _rest_group(scan) if scan.motion == "rest" else _data_group(scan)
-    if scan.motion != "rest":
+    if scan.motion != "rest" or scan.indenter:
         children["indenter"] = groups.indenter_group(scan.indenter, scan)
     if scan.noise_record is not None:
         children["noise_record"] = _rest_group(scan.noise_record)

@@ -127,6 +127,8 @@ array_chi_square: residuals of the worst sensor against the noise
     look at reference, farther pairs, drift, memory of the film
 press_errors: what common errors of place and load explain, over chance
     state x_errors, normal_load_errors (--position-error, --load-scatter)
+one_time: fall of chi-square by a second time of creep
+    begin the record at the contact, or correct by none
 common_mode: noise that two sensors share against that of their board
     state boards (in the layout table)
 """

@@ -98,7 +98,7 @@ def noise_of(record: Scan) -> NoiseRecord:
     from scipy.signal import periodogram
 
     name = record.source.file_name if record.source else "The noise record"
-    if record.motion != "rest" or record.time is None:
+    if record.motion != "rest" or record.time is None or record.indenter:
         raise InputError(
             f"{name} is no noise record: something was pressed on the sensor.",
             cure="Give the readings of the sensor at rest (memscal import --noise-record).",
