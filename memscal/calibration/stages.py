@@ -156,10 +156,12 @@ def deconvolve(
     sigma = fit_gaussian(g, estimate.gaussian.sigma)
     # Eq. 1: the voltage that A and G predict, of each scan through its own reference.
     model = estimate.model
+    data = estimate.points
+    in_place = data.scans == 1 and not data.in_motion and model.reference.order != ACROSS
     if posterior:
         signal = model.signal(model.geometry(estimate.centres), posterior.kernel) + estimate.oval
-    elif estimate.points.scans == 1 and model.reference.order != ACROSS:
-        signal = fields.convolved(quotient) * estimate.points.load
+    elif in_place:
+        signal = fields.convolved(quotient) * data.load
     else:
         k, kernel = fields.grid.axis_transfer(quotient.values)
         spectrum = np.interp(model.k, k, kernel.real, right=0.0)

@@ -31,6 +31,7 @@ from memscal.calibration.stages import Deconvolution, Solution
 from memscal.deconvolution.widths import kernel_functionals
 from memscal.errors import InputError
 from memscal.estimation.decorrelation import SlowNoise
+from memscal.estimation.forward import ForwardModel
 from memscal.estimation.influences import influences, measured_by, signal_by
 from memscal.estimation.points import ScanPoints
 from memscal.estimation.profile import ProfileEstimate, dynamics_changes
@@ -623,7 +624,10 @@ def _division_map(
     kernels = np.column_stack([estimate.kernel, estimate.basis.kernels(model.k)])
     count = kernels.shape[1] if estimate.points.u.size <= DENSE else _COLUMNS
     chunks = slices(kernels.shape[1], count)
-    signals = (model.signal(geometry, kernels[:, chunk]) for chunk in chunks)
+    # The fields that are divided are those of a still sensor.
+    still = ForwardModel(estimate.points, model.references) if estimate.points.in_motion else model
+    at = still.geometry(estimate.centres)
+    signals = (still.signal(at, kernels[:, chunk]) for chunk in chunks)
     kept = np.hstack([direct @ voltages for voltages in signals])
     radial = np.column_stack([estimate.radial(r), estimate.basis.radial(r)])
     places = slice(2, 2 + nuisance.shape[1])

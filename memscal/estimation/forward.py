@@ -167,7 +167,7 @@ class Geometry:
         """How many first nodes factors need: all, a half, a quarter and so on."""
         # A source with an edge has many waves, of which a wide kernel passes few.
         size = abs(spread)
-        used = np.flatnonzero(size > _NO_SHARE * size.max())
+        used = np.flatnonzero(size > _NO_SHARE * size.max(initial=0.0))
         needed = 1 + (used[-1] // (spread.size // len(spread)) if used.size else 0)
         halvings = int(np.log2(self.k.size / needed))
         return int(np.ceil(self.k.size / 2**halvings))

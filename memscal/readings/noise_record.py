@@ -171,7 +171,14 @@ def _means(values: FloatArray, edges: IndexArray, counts: IndexArray) -> FloatAr
 
 
 def record_messages(scan: Scan) -> Iterator[Message]:
-    """Say from which record the noise of a scan is."""
+    """Say from which record the noise of a scan is, and whether its dynamics count."""
+    timed = scan.time is not None and np.isfinite(scan.time).any()
+    if scan.sensor.dynamics and not (timed or scan.speed or scan.dwell_time):
+        yield Message(
+            "dynamics_unused",
+            "The sensor's dynamics do not count: neither the times of the readings nor a speed "
+            "(memscal import --time, --speed) tell how fast the indenter moved.",
+        )
     record = scan.noise_record
     if record is not None:
         named = "a record at rest that travels with the scan"

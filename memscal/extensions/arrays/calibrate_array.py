@@ -219,6 +219,12 @@ def _opened(scan: Scan | str | PathLike[str], *, accept_altered: bool) -> Scan:
             why="An array names its sensors (Scan(sensors=...), memscal import --u 'u_*').",
             cure="Calibrate it with memscal.calibrate.",
         )
+    if opened.sensor.dynamics:
+        raise InputError(
+            "The scan states dynamics of the sensor (/entry/instrument/stress_sensor/dynamics).",
+            why="An array is calibrated by readings that follow the stress at once.",
+            cure="Scan so slowly that they do, or hold the indenter, and leave the dynamics out.",
+        )
     return opened
 
 

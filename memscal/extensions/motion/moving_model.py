@@ -29,6 +29,8 @@ from memscal.model.instrument import Dynamics
 _OVERSAMPLING = 1.25
 #: A grid reaches this share of a line's length beyond both of its ends.
 _BEYOND = 0.5
+#: A period is at most so many times longer: what is left of its other end is then a straight line.
+_LONGEST = 16
 
 
 class _Line(NamedTuple):
@@ -45,6 +47,11 @@ class MovingModel(ForwardModel):
     """Voltages at the points of scans that were made in motion."""
 
     sums_waves: ClassVar[bool] = False
+
+    @property
+    def round_references(self) -> bool:  # type: ignore[override]
+        """Whether the still sensor's references are round."""
+        return self.still.round_references
 
     @cached_property
     def still(self) -> ForwardModel:
@@ -152,7 +159,8 @@ def _weights(
     x = positions.min() - reach + step * np.arange(count)
     # Waves of a period that is so much longer that nothing of its other end is left.
     settling = settling_time(dynamics) * abs(speed).max() if dynamics else 0.0
-    half = (count + int(np.ceil((settling + averaging) / step))) // 2 + 1
+    beyond = min(settling + averaging, _LONGEST * count * step)
+    half = (count + int(np.ceil(beyond / step))) // 2 + 1
     period = 2 * half + 1
     k = 2 * np.pi / (period * step) * np.arange(half + 1)
     waves = np.exp(1j * np.outer(positions, k)) * np.sinc(k * averaging / (2 * np.pi))

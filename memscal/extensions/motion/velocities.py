@@ -2,46 +2,63 @@
 
 import numpy as np
 
+from memscal.errors import InputError
 from memscal.estimation.points import grouped
 from memscal.model.arrays import FloatArray
 from memscal.model.scan import Scan
 
-#: A velocity is taken over so many readings to either side.
+#: A velocity is taken over so many readings to either side, and over this share of them.
 _AROUND = 5
+_SHARE = 0.025
+#: Of the ways between readings, what moves on is at least this share; a random order has less.
+_ONWARDS = 0.5
 
 
 def velocities(scan: Scan) -> FloatArray:
-    """Return the velocity at each reading, in m/s, of their shape; zero where it was held, or NaN.
+    """Return the velocity at each reading, in m/s, of their shape; zero where it was held.
 
     By the times of the readings; else by the speed, in the stated direction, or in the order of the
-    positions.
+    readings.
     """
-    along, across = scan.positions if scan.direction == "x" else scan.positions[::-1]
     velocity = np.zeros(scan.shape)
     if scan.dwell_time:
         return velocity
-    if scan.time is not None:
-        line = grouped(np.ravel(scan.passes), np.ravel(across)).reshape(scan.shape)
-        for number in range(line.max() + 1):
-            rows = (line == number) & np.isfinite(scan.time)
-            velocity[rows] = _slopes(along[rows], scan.time[rows])
+    clock = np.arange(0.0, velocity.size).reshape(scan.shape)
+    speed = scan.speed
+    if scan.time is not None and np.isfinite(scan.time).any():
+        known = np.isfinite(scan.time)
+        # A reading without a time is taken to be between its neighbours.
+        clock = np.interp(clock, clock[known], scan.time[known])
+        speed = None
+    elif not speed:
         return velocity
-    if scan.speed:
-        ways = np.sign(scan.x[-1] - scan.x[0])
-        velocity += scan.speed * (
-            ways if scan.sliding_direction is None else scan.sliding_direction
-        )
-    return velocity
+    elif scan.sliding_direction is not None:
+        return velocity + speed * scan.sliding_direction
+    along, across = scan.positions if scan.direction == "x" else scan.positions[::-1]
+    line = grouped(np.ravel(scan.passes), np.ravel(across)).reshape(scan.shape)
+    for number in range(line.max() + 1):
+        rows = line == number
+        velocity[rows] = _slopes(along[rows], clock[rows])
+    return speed * np.sign(velocity) if speed else velocity
 
 
 def _slopes(x: FloatArray, time: FloatArray) -> FloatArray:
     """Return dx/dt at each of the readings (n,) of one pass."""
-    order = np.argsort(time, kind="stable")
-    place = np.arange(order.size)
-    after = order[np.minimum(place + _AROUND, order.size - 1)]
-    before = order[np.maximum(place - _AROUND, 0)]
-    apart = time[after] - time[before]
-    later = apart > 0
-    slopes = np.zeros(x.size)
-    slopes[order[later]] = (x[after] - x[before])[later] / apart[later]
-    return slopes
+    # A coarse clock gives several readings one time: they count by their mean.
+    ticks, tick, count = np.unique(time, return_inverse=True, return_counts=True)
+    path = np.bincount(tick, x) / count
+    place = np.arange(ticks.size)
+    around = max(_AROUND, round(_SHARE * ticks.size))
+    after = np.minimum(place + around, ticks.size - 1)
+    before = np.maximum(place - around, 0)
+    onwards = path[after] - path[before]
+    way = np.append(0.0, np.cumsum(np.abs(np.diff(path))))
+    if ticks.size < 2 or np.abs(onwards).sum() < _ONWARDS * (way[after] - way[before]).sum():
+        raise InputError(
+            "The positions of a scan do not follow each other in time.",
+            why="How a sensor follows a reading depends on how fast the indenter moves there.",
+            cure="Give the time of each reading (/entry/data/time); if the indenter was held at "
+            "each, say how long (memscal import --dwell S).",
+        )
+    slopes = onwards / (ticks[after] - ticks[before])
+    return slopes[tick]

@@ -8,6 +8,7 @@ from helpers.true_arrays import Errors, simulated_scan
 from scipy.interpolate import CubicSpline
 
 import memscal
+from memscal import Dynamics, StressSensor
 from memscal.errors import FitError, InputError, MemscalError
 from memscal.extensions.arrays.presses import sorted_readings
 
@@ -156,6 +157,8 @@ def refused_scans():
     yield "crosstalk", scan, {"crosstalk": "nearst"}, MemscalError, "nearest"
     yield "pair", scan, {"crosstalk": [("T00", "T1")]}, MemscalError, "T01"
     yield "itself", scan, {"crosstalk": [("T01", "T01")]}, MemscalError, "no other sensor T01"
+    slow = StressSensor(dynamics=Dynamics(low_pass=3.0))
+    yield "dynamics", replace(scan, sensor=slow), {}, InputError, "stress_sensor/dynamics"
     yield "silent", replace(scan, u_zz=0 * scan.u_zz), {}, FitError, "3 sensors"
 
 

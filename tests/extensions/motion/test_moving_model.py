@@ -12,6 +12,7 @@ from scipy.signal import TransferFunction, lsim
 from scipy.special import j0
 
 import memscal
+from memscal.errors import InputError
 from memscal.estimation.forward import forward_model
 from memscal.estimation.points import measured_points
 from memscal.estimation.reference_spectra import reference_spectra
@@ -175,8 +176,9 @@ def test_velocities_follow_the_times_the_speed_and_the_direction():
     sliding = scan_of(None, x=x, speed=1e-3, motion="sliding", sliding_direction=-1)
     assert velocities(sliding) == pytest.approx(-1e-3)
     gap = replace(both, time=np.where(np.arange(202) == 50, np.nan, time))
-    assert velocities(gap)[50] == 0.0
-    assert velocities(gap)[:50] == pytest.approx(2e-3)
+    assert velocities(gap) == pytest.approx(velocities(both))
+    coarse = replace(both, time=np.floor(10 * time + 1e-9) / 10)
+    assert velocities(coarse) == pytest.approx(velocities(both), rel=0.1)
 
 
 def test_uncertain_dynamics_count_by_their_derivative():
@@ -189,3 +191,62 @@ def test_uncertain_dynamics_count_by_their_derivative():
     assert changes["low_pass"] == pytest.approx(
         faster - slower, abs=1e-3 * abs(faster - slower).max()
     )
+
+
+def test_forth_and_back_in_one_pass_turns_the_velocity():
+    x = np.linspace(0, 10e-3, 101)
+    one_pass = {"u": np.arange(202.0), "x": np.append(x, x[::-1]), "repeat": np.zeros(202, int)}
+    for stated in ({"speed": 1e-3}, {"time": 0.1 * np.arange(202.0)}):
+        velocity = velocities(scan_of(None, **one_pass, **stated))
+        assert velocity[:95] == pytest.approx(1e-3)
+        assert velocity[107:] == pytest.approx(-1e-3)
+
+
+@pytest.mark.parametrize("stated", [{"speed": 1e-3}, {"time": np.arange(101.0)}, {"time": 0 * X}])
+def test_positions_that_do_not_follow_each_other_are_refused(stated):
+    x = X[: len(stated.get("time", X[:101]))]
+    order = np.random.default_rng(0).permutation(x.size)
+    scan = scan_of(DYNAMICS["low_pass"], x=x[order], **stated)
+    with pytest.raises(InputError, match="do not follow each other in time"):
+        measured_points(scan)
+
+
+def test_a_creep_that_is_slow_takes_no_more_room_than_a_scan():
+    """At 1 m/s only what does not creep is left."""
+    creep = memscal.Dynamics(creep_share=0.05, creep_time=30.0)
+    fast = model_signal(scan_of(creep, speed=1.0))[3]
+    still = model_signal(scan_of(None))[3]
+    left = fast - 0.95 * still
+    drift = np.polyval(np.polyfit(X, left, 1), X)
+    assert left == pytest.approx(drift, abs=2e-5 * still.max())
+
+
+def rod_scan(noise=0.001, **stated):
+    """A scan with the rod by a sensor with a low-pass of 0.3 Hz, at 1 mm/s, as it is read."""
+    path = np.arange(-40e-3, 12e-3, 0.01e-3)
+    u = np.interp(X, path, in_time(DYNAMICS["low_pass"], still_signal(path), 0.01))
+    scatter = noise * u.max() * np.random.default_rng(5).standard_normal(X.size)
+    errors = np.full(X.size, noise * u.max())
+    scan = scan_of(DYNAMICS["low_pass"], u=u + scatter, u_zz_errors=errors, **stated)
+    return replace(scan, film=replace(FILM, law="linear"))
+
+
+@pytest.mark.parametrize("method", ["bayesian", "white-noise"])
+def test_both_routes_find_the_still_sensor(method):
+    found = memscal.calibrate(rod_scan(speed=SPEED), method=method, other=False)
+    parameters = found.apparatus.parameters
+    assert parameters["conversion_constant"] == pytest.approx(1.0, rel=0.01)
+    assert parameters.uncertainty("conversion_constant") < 0.013
+    assert parameters["gaussian_sigma"] == pytest.approx(WIDTH, rel=0.015)
+    assert parameters["centre"] == pytest.approx(CENTRE, abs=2e-6)
+    # A load of 1 N is too deep for the rod.
+    assert [check.name for check in found.apparatus.checks if not check.passed] == ["indentation"]
+
+
+def test_dynamics_without_a_velocity_are_told_not_to_count():
+    def kinds(scan):
+        apparatus = memscal.calibrate(scan, other=False).apparatus
+        return [message.kind for message in apparatus.process.messages]
+
+    assert "dynamics_unused" in kinds(rod_scan())
+    assert "dynamics_unused" not in kinds(rod_scan(speed=SPEED))
