@@ -26,6 +26,7 @@ from memscal.cli.options import (
     film_options,
     indenter_from,
     laboratory_option,
+    motion_options,
     named,
     option,
     output_options,
@@ -78,6 +79,9 @@ Examples:
   memscal import current.csv -o scan.h5 --x x --u current
   memscal import scan.xlsx -o scan.h5 --sheet Data --x Weg --u Spannung --noise 0.04 --missing n.a.
   memscal import log.csv -o scan.h5 --x x --u U --load-column F --holds --figure holds.png
+  memscal import slid.csv -o slid.h5 --time t --speed 1 --u U --sliding direction --low-pass 10
+      --load 1.37 --tangential-load Q --indenter sphere --radius 128.8
+      --young-modulus 2.2 --poisson-ratio 0.5 --thickness 2
   memscal import row.csv -o row.h5 --x x --u "u_*" --layout layout.csv
       --load 1 --radius 0.25 --young-modulus 2.2 --poisson-ratio 0.5 --thickness 2
   memscal import die_00.csv -o die_00.h5 --x x --u U --load 1 --save-recipe recipe.toml
@@ -196,8 +200,14 @@ _NAMED = 12
     "Scan: unit of the times, s or ms.  [default: that of the column's head]"
 )
 @option("--speed", Quantity("mm/s", low=-float("inf")))(
-    "Scan without positions: speed of the stage, in mm/s. The position is speed times time."
+    "Scan: speed of the stage, in mm/s. Without --x the position is speed times time."
 )
+@option("--sliding", "forth|back|COLUMN")(
+    "Scan of an indenter that slid: forth, to larger x, or back, or the column that says it (1 or "
+    "forth, -1 or back). With --speed and --time positions go back with it."
+)
+@option("--tangential-load", "COLUMN")("Scan: column of the load along the line at each point.")
+@motion_options
 @option("--step", Quantity("mm"))(
     "Scan: distance of neighbouring places, in mm. They are counted by --x or, with --holds and "
     "without --x, by the presses of the load or the depth."
@@ -544,7 +554,7 @@ def _set_up(options: Options) -> dict[str, Any]:
 def read_table(path: Path, options: Options) -> ImportedScan:
     """Read a scan with options that are prepared."""
     from memscal.formats.tables.scan import ARRAYS, import_table, records_of
-    from memscal.model.instrument import LoadCell, StressSensor
+    from memscal.model.instrument import Dynamics, LoadCell, StressSensor
 
     if options["name_pattern"]:
         name = hook("place_in_name")(path, options)["sensor"]
@@ -552,7 +562,9 @@ def read_table(path: Path, options: Options) -> ImportedScan:
     sensor = {field: options[option] for field, option in _SENSOR_NAMES.items()}
     load_cell = {field: options[option] for field, option in _CELL_NAMES.items()}
     stated = stated_options(options, options)
-    stated["sensor"] = StressSensor(**stated_options(sensor, _SENSOR_NAMES))
+    dynamics = stated_options(options, options.keys() & vars(Dynamics()).keys())
+    sensor["dynamics"] = Dynamics(**dynamics) if dynamics else None
+    stated["sensor"] = StressSensor(**stated_options(sensor, sensor))
     stated["load_cell"] = LoadCell(**stated_options(load_cell, _CELL_NAMES))
     stated["x_error"] = options["position_error"]
     columns = stated_options(options, ("x", "u", *ARRAYS))

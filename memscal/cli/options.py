@@ -303,6 +303,34 @@ def _measured(
     )
 
 
+motion_options = _measured(
+    (
+        (
+            "sliding-friction",
+            NonNegative("ratio"),
+            "Scan: tangential over normal load of the sliding indenter, where it was measured.",
+            "the sliding friction.",
+        ),
+        (
+            "low-pass",
+            Quantity("Hz"),
+            "Scan: corner of the low-pass of one pole that the readings went through, in Hz.",
+            "the corner of the low-pass, in Hz.",
+        ),
+        (
+            "resonance",
+            Quantity("Hz"),
+            "Scan: resonance of the sensor, in Hz, with --quality.",
+            "the resonance, in Hz.",
+        ),
+        ("quality", Quantity("ratio"), "Scan: quality of the resonance.", "the quality."),
+    ),
+    _NO_DEFAULTS,
+    uncertainties=True,
+)
+"""The friction of an indenter that slides, and how the sensor follows it in time."""
+
+
 def film_from(options: Options, otherwise: str = "") -> ElasticFilm:
     """Return the film that the options describe; ``otherwise``: what to do without one of them."""
     _require("The film", options, FILM, otherwise)

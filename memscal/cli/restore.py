@@ -42,6 +42,9 @@ Examples:
     "friction, to be shown beside the result."
 )
 @option("--load", Quantity("N"))("Which load of a scan of several is restored, in N.")
+@option("--direction", click.Choice(["forth", "back"]))(
+    "Which direction is restored of a scan whose indenter slid forth and back."
+)
 @contact_options
 @figure_option("Draw the restored, the measured and the calculated stress, and residuals.")
 @report_options
@@ -63,10 +66,10 @@ def command(artifact: Path, scan: Path, **options: Any) -> int:
     inputs = [artifact, scan, options["expected"], options["noise_record"]]
     out.prove_writable(outputs, force=options["force"], inputs=inputs)
     with out.working("Restoring"):
-        names = ("expected", "load", "noise_record", "override", "accept_altered")
+        names = ("expected", "load", "direction", "noise_record", "override", "accept_altered")
         settings = {name: options[name] for name in names}
         restored = restore(scan, artifact, **settings)
-        if settings["expected"] is None:
+        if settings["expected"] is None and restored.scan.motion != "sliding":
             try:
                 contact = press_rod(*restored.scan.set_up)
                 restored = replace(restored, comparison=restored.compare(contact))

@@ -180,6 +180,7 @@ def _layout(file: SafeFile, schema: str) -> Iterator[tuple[str, Record]]:
     yield from {**own, **_LAYOUT, **own}.items()
     for path in profile_paths(file):
         yield path, records.STRESS_NUMBERS
+        yield path, records.SLID
         yield path, records.STRESS_PROFILE
 
 

@@ -29,14 +29,7 @@ from memscal.model.provenance import SourceFile, accepted_alterations
 from memscal.model.records import points_record
 
 _CHANNELS = ("zz", "xz", "yz")
-_NOT_ALWAYS = (
-    "centre_y",
-    "centre_y_errors",
-    "load_errors",
-    "lubrication",
-    "direction",
-    "tangential_load",
-)
+_NOT_ALWAYS = ("centre_y", "centre_y_errors", "load_errors", "lubrication")
 
 
 def _read_points(file: SafeFile, name: str, of: Reading) -> dict[str, MeasuredPoints]:
@@ -218,7 +211,6 @@ def _entry(measured: MeasuredStress) -> Group:
 def _profile_group(profile: MeasuredProfile, scans: tuple[MeasuredScan, ...]) -> Group:
     record = records.STRESS_NUMBERS.read_in(profile.scan.reading)
     stated = {q.name: getattr(profile, q.name, None) for q in record.quantities}
-    stated["direction"] = profile.direction or None
     # A line does not determine its centre across it.
     for i, name in enumerate(("centre", "centre_y")):
         if i == 0 or profile.centre_uncertainty[i] > 0:
@@ -228,6 +220,8 @@ def _profile_group(profile: MeasuredProfile, scans: tuple[MeasuredScan, ...]) ->
     # What not every profile has comes last.
     optional = {name: numbers.pop(name) for name in _NOT_ALWAYS if name in numbers}
     number = writer.count(scans.index(profile.scan) + 1)
+    if profile.direction:
+        optional |= write_record(records.SLID, profile).children
     return write_record(records.STRESS_PROFILE, profile, scan=number, **numbers, **optional)
 
 
@@ -317,6 +311,7 @@ def _read_profile(file: SafeFile, path: str, scan: MeasuredScan) -> MeasuredProf
         )
     profile = {"y": np.zeros(n), "load_uncertainty": None} | arrays
     profile |= read_record(records.STRESS_NUMBERS.read_in(scan.reading), file, path)
+    profile |= read_record(records.SLID, file, path)
     curve = _part_of_profile(file, "curves", name, f"{path}/curve")
     if file.has(curve):
         profile |= read_record(records.STRESS_CURVE, file, curve)

@@ -36,7 +36,7 @@ from memscal.model.arrays import Arrays, FloatArray, array_record
 from memscal.model.correlation import is_banded
 from memscal.model.indenter import Rod
 from memscal.model.measured_stress import MeasuredPoints, MeasuredProfile, MeasuredScan
-from memscal.model.scan import Scan
+from memscal.model.scan import DIRECTIONS, Scan
 
 _LARGEST_KH = 20.0
 _LOAD_STEP = 0.02
@@ -389,7 +389,7 @@ def measured_profile(
         baseline=restored.baseline,
         baseline_uncertainty=restored.baseline_uncertainty,
         contact_radius=signal.contact_radius,
-        direction=scan.directions[0],
+        direction=sum(DIRECTIONS[word] for word in scan.directions),
         tangential_load=_tangential_load(scan),
         curve_r=curve_r,
         curve_s_zz=restored.blurred_stress(curve_r),

@@ -52,7 +52,7 @@ from memscal.model.indenter import Rod
 from memscal.model.measured_stress import MeasuredScan
 from memscal.model.provenance import accepted_alterations
 from memscal.model.records import FILM, SENSOR
-from memscal.model.scan import DIRECTIONS, Scan
+from memscal.model.scan import Scan
 from memscal.model.sizes import MOST_OF_CONTACT, too_large
 from memscal.parallel import single_threaded
 from memscal.progress import reported
@@ -69,7 +69,7 @@ _SCATTER = 0.15
 
 def single_loads(scan: Scan) -> tuple[Scan, ...]:
     """Split a scan by direction of sliding, and by load, if recorded, the smallest first."""
-    directions = [scan.only_direction(sign) for sign in scan.directions]
+    directions = [scan.only_direction(word) for word in scan.directions] or [scan]
     return tuple(chain(*map(_by_load, directions)))
 
 
@@ -114,8 +114,7 @@ def place_of(scan: Scan) -> str:
 
 def load_of(scan: Scan) -> str:
     """Name a scan's file, load and lubrication, for messages."""
-    slid = " and ".join(DIRECTIONS.get(sign, "") for sign in scan.directions)
-    words = (place_of(scan), f"{scan.load:.4g} N", slid, scan.lubrication)
+    words = (place_of(scan), f"{scan.load:.4g} N", *scan.directions, scan.lubrication)
     return ", ".join(filter(None, words))
 
 
@@ -373,6 +372,7 @@ def restore(
     apparatus: ApparatusFunction | FilePath,
     *,
     load: float | None = None,
+    direction: str | None = None,
     expected: Expected = None,
     noise_record: Scan | FilePath | None = None,
     override: bool = False,
@@ -392,6 +392,8 @@ def restore(
         The calibrated sensor.
     load : float, optional
         Which load of a scan of several, in N, to within 5 %.
+    direction : "forth" or "back", optional
+        Which direction of a scan whose indenter slid in both.
     expected : StressProfile, Contact or path, optional
         A calculated base stress to hold against the restored one: adds a check.
     noise_record : Scan or path, optional
@@ -423,7 +425,8 @@ def restore(
     True
     """
     sensor = opened_apparatus(apparatus, accept_altered=accept_altered)
-    measured = opened_scan(scan, accept_altered=accept_altered, noise_record=noise_record)
+    opened = opened_scan(scan, accept_altered=accept_altered, noise_record=noise_record)
+    measured = opened.only_direction(direction)
     if load is not None:
         measured = scan_at_load(measured, load)
     if isinstance(expected, str | PathLike):

@@ -224,9 +224,14 @@ class MeasuredProfile(ByContent):
 
     @property
     def label(self) -> str:
-        """Load, direction of sliding and lubrication in words, as in ``"0.34 N, forth, dry"``."""
-        words = (f"{self.load:.4g} N", DIRECTIONS.get(self.direction), self.lubrication)
-        return ", ".join(filter(None, words))
+        """Load and state in words, as in ``"0.34 N, dry"``."""
+        return ", ".join(filter(None, (f"{self.load:.4g} N", self.state)))
+
+    @property
+    def state(self) -> str:
+        """Direction of sliding and lubrication in words, as in ``"forth, dry"``, where stated."""
+        slid = [word for word, sign in DIRECTIONS.items() if sign == self.direction]
+        return ", ".join(filter(None, (*slid, self.lubrication)))
 
     @property
     def lubrication(self) -> str:

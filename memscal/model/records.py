@@ -407,9 +407,13 @@ STRESS_NUMBERS = record(
     *measured(Quantity("centre_y", _L, "centre along y", "y₀")),
     *required(*measured(Quantity("baseline", _U, "baseline", "U₀"))),
     Quantity("contact_radius", _L, "contact radius", "a", required=True),
+)
+SLID = record(
+    "NXdata",
     Quantity("direction", _ONE, "direction of sliding"),
     Quantity("tangential_load", "force", "mean tangential load", "Q"),
 )
+"""Numbers of a profile whose indenter slid, beside its other ones."""
 STRESS_CURVE = record(
     "NXdata",
     *required(

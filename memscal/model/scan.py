@@ -54,8 +54,8 @@ LUBRICATIONS = ("", "dry", "lubricated")
 MOTIONS = ("", "pressed", "sliding", "rest")
 """How an indenter moved; one that states nothing was pressed.  A noise record has none: rest."""
 
-DIRECTIONS = {1.0: "forth", -1.0: "back"}
-"""Words of the directions of a sliding indenter: along the positions, and against them."""
+DIRECTIONS = {"forth": 1.0, "back": -1.0}
+"""Signs of the directions of a sliding indenter: along the positions, and against them."""
 
 STATED_ERRORS = (
     "position_scale",
@@ -72,6 +72,7 @@ STATED_ERRORS = (
 BRANCHES = {"approach": 1, "retreat": 2}
 """Numbers of the indenter's branches; 0 where none is stated."""
 
+_ONE_WAY = "The stress under an indenter that slides forth is not that of one that slides back."
 #: One value of these is that of a whole row, or of all.
 _BY_ROW = ("branch", "sliding_direction")
 #: Points that spread by less of their length across it are a line.
@@ -114,7 +115,7 @@ def require_pressed(motion: str, source: SourceFile | None) -> None:
             why="The calculated contacts are those of an indenter that is pressed straight down; "
             "sliding friction shifts and skews the stress at the base of the film.",
             cure="Give a scan whose indenter was pressed at each place. What stress a sliding one "
-            "made, memscal restore finds.",
+            "made, memscal restore finds, and its friction memscal compare --sliding.",
         )
 
 
@@ -182,6 +183,8 @@ class ArrayOptions(TypedDict, total=False):
     u_xz: ArrayLike
     u_yz: ArrayLike
     time: ArrayLike
+    sliding: ArrayLike
+    tangential_load: ArrayLike
     x_unit: str
     u_unit: str
     load_unit: str
@@ -224,6 +227,8 @@ class ArrayOptions(TypedDict, total=False):
     shear_sensitivity_uncertainty: float
     u_zz_correlation: FloatArray
     motion: str
+    sliding_friction: float
+    sliding_friction_uncertainty: float
     averaging_length: float
     dwell_time: float
 
@@ -550,22 +555,29 @@ class Scan:
         return only_points(self, np.flatnonzero(np.isin(self.passes, numbers)))
 
     @property
-    def directions(self) -> tuple[float, ...]:
-        """Directions in which a sliding indenter moved, 1 before -1; 0 alone if none is stated."""
-        signs = 0.0 if self.sliding_direction is None else self.sliding_direction
-        return tuple(np.unique(signs)[::-1].tolist())
+    def directions(self) -> tuple[str, ...]:
+        """In which of ``"forth"`` and ``"back"`` a sliding indenter moved; none if not stated."""
+        signs = self.sliding_direction
+        return tuple(word for word, sign in DIRECTIONS.items() if np.any(signs == sign))
 
-    def only_direction(self, sign: float) -> Scan:
-        """Return the passes of one of the ``directions``."""
-        if self.directions == (sign,):
+    def only_direction(self, direction: str | None) -> Scan:
+        """Return the passes of a direction, which may be left out where the scan has not two."""
+        held = self.directions
+        if direction is None and len(held) < 2:
             return self
-        numbers = np.unique(self.passes[self.sliding_direction == sign])
-        passes = self.only_passes(numbers)
-        if passes.directions != (sign,):
+        if direction not in held:
+            raise InputError(
+                f"The indenter slid {' and '.join(held) or 'in no stated direction'}, and "
+                f"{direction or 'no direction'} is chosen.",
+                why=_ONE_WAY,
+                cure="Choose one of those of the scan: direction='forth' or 'back' (--direction).",
+            )
+        slid = self.passes[self.sliding_direction == DIRECTIONS[direction]]
+        passes = self.only_passes(np.unique(slid))
+        if passes.directions != (direction,):
             raise InputError(
                 "A pass of the scan holds both directions of sliding.",
-                why="The stress under an indenter that slides forth is not that of one that slides "
-                "back.",
+                why=_ONE_WAY,
                 cure="Number the passes (repeat, --repeat COLUMN), or give each direction as a "
                 "scan of its own.",
             )

@@ -27,6 +27,8 @@ def mapping(stress: MeasuredStress) -> Values:
     profiles = []
     for profile in stress.profiles:
         numbers = [quantity.read_in(profile.scan.reading) for quantity in _IN_JSON]
+        if profile.direction:
+            numbers += records.SLID.quantities
         profiles.append(
             {
                 "scan": getattr(profile.scan.source, "file_name", None),
@@ -89,7 +91,7 @@ def _profiles_table(stress: MeasuredStress) -> Table:
     rows = []
     marked = set()
     for i, profile in enumerate(stress.profiles):
-        row = [str(i + 1), f"{profile.load:.4g}", profile.lubrication or "not stated"]
+        row = [str(i + 1), f"{profile.load:.4g}", profile.state or "not stated"]
         centre = _centre(profile)
         row += [declared.cell(quantity, profile, unit="", **centre) for quantity in quantities]
         checks = [check for check in stress.checks if check.profile == row[0]]

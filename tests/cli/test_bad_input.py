@@ -97,7 +97,7 @@ def test_an_altered_file_is_used_by_no_command_unless_that_is_recorded(run, scan
         ),
         (
             replace(SCAN, motion="sliding"),
-            ("made with a sliding indenter", "entry/indenter/motion"),
+            ("made with a sliding indenter", "entry/indenter/motion", "memscal compare --sliding"),
         ),
     ],
 )

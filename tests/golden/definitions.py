@@ -105,7 +105,10 @@ DEFINITIONS: Mapping[str, tuple[str, Mapping[str, Record], tuple[str, ...]]] = {
         {
             # Each profile has a name of its own.
             "": record(
-                "NXdata", *records.STRESS_PROFILE.quantities, *records.STRESS_NUMBERS.quantities
+                "NXdata",
+                *records.STRESS_PROFILE.quantities,
+                *records.STRESS_NUMBERS.quantities,
+                *records.SLID.quantities,
             ),
             **dict.fromkeys(("roots", "budgets", "curves"), _ANYTHING),
             **dict.fromkeys(("points_zz", "points_xz", "points_yz"), _ANYTHING),

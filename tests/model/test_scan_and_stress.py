@@ -97,9 +97,9 @@ def test_passes_of_one_direction_are_told_from_those_of_the_other(kind):
         rows[-9:] = -1.0
         scan = replace(scan, repeat=np.where(rows > 0, 1, 2))
     scan = replace(scan, motion="sliding", sliding_direction=rows)
-    assert scan.directions == (1.0, -1.0)
-    both = [scan.only_direction(sign) for sign in scan.directions]
-    assert [part.directions for part in both] == [(1.0,), (-1.0,)]
+    assert scan.directions == ("forth", "back")
+    both = [scan.only_direction(word) for word in scan.directions]
+    assert [part.directions for part in both] == [("forth",), ("back",)]
     assert sum(part.u_zz.size for part in both) == scan.u_zz.size
     assert np.array_equal(both[1].u_zz.ravel(), scan.u_zz[rows < 0], equal_nan=True)
 
@@ -107,7 +107,7 @@ def test_passes_of_one_direction_are_told_from_those_of_the_other(kind):
 def test_a_pass_of_both_directions_is_refused():
     scan = make_scan(motion="sliding", sliding_direction=np.where(np.arange(33) < 9, 1, -1))
     with pytest.raises(InputError, match="holds both directions"):
-        scan.only_direction(1.0)
+        scan.only_direction("forth")
 
 
 def test_a_scan_keeps_its_own_copy_of_its_data():

@@ -15,7 +15,9 @@ from memscal.formats.files import FilePath, read_bytes
 from memscal.formats.units import to_si
 from memscal.model.apparatus import ApparatusData
 from memscal.model.arrays import Values
+from memscal.model.instrument import Dynamics
 from memscal.model.quantities import ESTIMATED
+from memscal.model.records import DYNAMICS
 from memscal.model.scan import STATED_ERRORS, Scan
 
 _LONGEST = 1 << 20
@@ -49,7 +51,9 @@ _KEYS = {
     "laboratory": f"name* {_ADDRESS} accreditation prefix:code number:code",
     "customer": f"name* {_ADDRESS}",
     "person": "name* role* operator",
-    "sensor": "name* model manufacturer* serial*",
+    "sensor": " ".join(
+        ["name* model manufacturer* serial*", *(f"{q.name}:number" for q in DYNAMICS.quantities)]
+    ),
     "film": "name",
     "indenter": "name",
     "equipment": "name* kind:kind serial* certificate* date*:date",
@@ -110,6 +114,8 @@ class LaboratoryFile:
         The customer, and who authorises, stay in the file.
         """
         sensor = dict(self.sections.get("sensor", {}))
+        names = sensor.keys() & vars(Dynamics()).keys()
+        dynamics = {name: sensor.pop(name) for name in names}
         temperature = self.stated("conditions", "temperature")
         if temperature is not None:
             sensor["temperature"] = temperature.value
@@ -130,6 +136,10 @@ class LaboratoryFile:
         for name, stated in parts.items():
             part = getattr(holder, name)
             added[name] = replace(part, **self._added(part, stated, name))
+        if dynamics:
+            held = holder.sensor.dynamics or Dynamics()
+            known = replace(held, **self._added(held, dynamics, "sensor"))
+            added["sensor"] = replace(added["sensor"], dynamics=known)
         return added
 
     def _added(self, part: object, stated: Section, subject: str) -> Values:

@@ -18,16 +18,17 @@ from memscal.formats.tables.columns import Wanted
 from memscal.formats.tables.sheets import open_table
 
 SECTIONS = {
-    "table": "x x_unit y u u_unit u_errors noise u_xz u_yz u_sign ceiling repeat branch time "
-    "time_unit speed step averaging_length dwell_time holds depth depth_unit baseline "
+    "table": "x x_unit y u u_unit u_errors noise u_xz u_yz u_sign ceiling repeat branch sliding "
+    "time time_unit speed step averaging_length dwell_time holds depth depth_unit baseline "
     "baseline_curvature_uncertainty line_offset_uncertainty title start_time lab sheet scan "
     "skip_rows missing delimiter decimal",
     "film": "young_modulus young_modulus_uncertainty poisson_ratio poisson_ratio_uncertainty "
     "thickness thickness_uncertainty film_law mooney_rivlin_ratio base_slip_uncertainty film_name",
     "indenter": "indenter indenter_name radius radius_uncertainty rod_friction lubrication "
-    "lubricant",
-    "load": "load load_column load_unit load_uncertainty load_scatter",
+    "lubricant sliding_friction sliding_friction_uncertainty",
+    "load": "load load_column load_unit load_uncertainty load_scatter tangential_load",
     "sensor": "layout sensor_name sensor_model channel name_pattern die_pitch gain_uncertainty "
+    "low_pass low_pass_uncertainty resonance resonance_uncertainty quality quality_uncertainty "
     "gain_curvature_uncertainty roundness_uncertainty shear_sensitivity_uncertainty",
     "equipment": "load_cell load_cell_serial position_error position_errors_by_repeat "
     "position_scale_uncertainty",

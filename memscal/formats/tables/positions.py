@@ -20,7 +20,7 @@ def require_positions(named: Mapping[str, Any], layout: TableLayout, *, resting:
         if others or layout.holds or named["time"] is None:
             cure = "Name the columns of time and readings alone (--time, --u)."
             raise InputError("A noise record is readings in time, at rest.", cure=cure)
-    elif layout.speed is not None:
+    elif layout.speed is not None and not (columns and named["time"] is None):
         others = columns or layout.step is not None or layout.holds or "repeat 0" in named
         if others or named["time"] is None or not 0 < abs(layout.speed) < np.inf:
             raise InputError(
@@ -46,7 +46,7 @@ def make_positions(
 ) -> int | None:
     """Make the positions that no column states; return how many presses were counted for it."""
     presses: int | None = None
-    if layout.speed is not None:
+    if layout.speed is not None and "time" in columns:
         time = columns["time"]
         stated = np.flatnonzero(np.isfinite(time))
         back = stated[1:][np.diff(time[stated]) < 0]
@@ -57,6 +57,13 @@ def make_positions(
                 cure="Give the positions (--x COLUMN), or each pass as a table of its own.",
             )
         columns["x"] = layout.speed * time
+        signs = columns.get("sliding_direction")
+        if signs is not None and stated.size:
+            from scipy.integrate import cumulative_trapezoid
+
+            # From the last reading forth to the first one back half of the time is forth.
+            way: Any = cumulative_trapezoid(np.nan_to_num(signs[stated]), time[stated], initial=0)
+            columns["x"][stated] = abs(layout.speed) * way
         notes.append(f"The positions are {layout.speed * 1e3:.4g} mm/s times the time.")
     elif layout.step is not None:
         counted = "The places"

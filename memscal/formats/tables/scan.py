@@ -23,7 +23,7 @@ from memscal.model.indenter import Rod, RoundIndenter
 from memscal.model.notation import Reading, format_measured
 from memscal.model.quantities import dimension_in
 from memscal.model.records import FILM, LOAD, ROUND_INDENTER, TAKEN_FOR_GRANTED
-from memscal.model.scan import BRANCHES, ArrayOptions, Scan, branch_numbers, load_groups
+from memscal.model.scan import BRANCHES, DIRECTIONS, ArrayOptions, Scan, branch_numbers, load_groups
 from memscal.progress import Listener, reported
 from memscal.readings.ceiling import without_clipped
 from memscal.readings.dead_rows import without_dead_rows
@@ -45,7 +45,19 @@ _RECORDS = {"layout": TableLayout, "conditions": ScanConditions, "uncertainties"
 #: What of a layout is for who opens the table.
 _READING = ("sheet", "scan", "skip_rows", "missing", "delimiter", "decimal")
 #: Options that name columns, besides x and u.
-ARRAYS = ("y", "repeat", "branch", "u_errors", "load_column", "depth", "u_xz", "u_yz", "time")
+ARRAYS = (
+    "y",
+    "repeat",
+    "branch",
+    "u_errors",
+    "load_column",
+    "depth",
+    "u_xz",
+    "u_yz",
+    "time",
+    "sliding",
+    "tangential_load",
+)
 #: Words of a column that tells when the indenter presses.
 _PRESSING = {"false": 0.0, "true": 1.0}
 #: Positions closer than this share of the typical spacing are probably one place, and a table with
@@ -84,6 +96,8 @@ def import_table(
     repeat: Column | Sequence[Column] | None = None,
     branch: Column | None = None,
     time: Column | None = None,
+    sliding: Column | None = None,
+    tangential_load: Column | None = None,
     layout: TableLayout | None = None,
     conditions: ScanConditions | None = None,
     uncertainties: ScanUncertainties | None = None,
@@ -117,6 +131,12 @@ def import_table(
     time : str or int, optional
         Column of the times, which the scan keeps in s from the first; with a speed
         (``TableLayout``) they make the positions.
+    sliding : "forth", "back", str or int, optional
+        Of an indenter that slid: its one direction, along the positions or against them, or the
+        column that states it, as 1 and -1 or in these words.  Where it turns a pass begins, unless
+        ``repeat`` numbers them; with a speed and times positions go back with it.
+    tangential_load : str or int, optional
+        Column of the load along the positions at each point.
     repeat : str or int, or several
         Columns that number the passes; each combination of several is one.
     layout : TableLayout, optional
@@ -159,6 +179,9 @@ def import_table(
     layout = layout or TableLayout()
     conditions = conditions or ScanConditions()
     uncertainties = uncertainties or ScanUncertainties()
+    direction = DIRECTIONS.get(str(sliding))
+    if sliding is not None:
+        conditions = replace(conditions, motion="sliding")
     readings = _listed(u)
     named = {
         "u_zz": next(iter(readings), None),
@@ -166,6 +189,8 @@ def import_table(
         "u_yz": u_yz,
         "u_zz_errors": u_errors,
         "normal_load": load_column,
+        "tangential_load": tangential_load,
+        "sliding_direction": sliding if direction is None else None,
         "depth": depth,
         "x": x,
         "y": y,
@@ -184,6 +209,8 @@ def import_table(
     _require_use(named, layout, conditions, uncertainties)
     wanted, reading = _wanted(table, named, layout)
     columns, notes = _read_columns(table, wanted, layout.u_sign, uncertainties.noise)
+    if direction is not None:
+        columns["sliding_direction"] = np.full(columns["u_zz"].shape, direction)
     if array:
         notes += hook("add_up")(columns, layout)
     presses = make_positions(columns, layout, notes, table.lines)
@@ -208,7 +235,7 @@ def import_table(
     columns = without_dead_rows(columns, notes)
     bare = replace(conditions, layout=None) if array else conditions
     scan = _scan_of(columns, notes, reading, bare, uncertainties, table, holds)
-    scan = one = replace(scan, at_ceiling=clipped)
+    scan = one = replace(scan, at_ceiling=clipped, speed=layout.speed and abs(layout.speed))
     if array:
         scan, one = hook("array_scan")(scan, conditions.layout, layout.ceiling, of)
     del columns  # the scan has copies, and ten million rows are many
@@ -323,6 +350,7 @@ def _wanted(
     reading = reading_of(u_unit, table.where(u))
     of_u = dimension_in("voltage", reading)
     channel = (of_u, layout.u_unit, "u_unit (--u-unit)", u_unit)
+    force: Form = ("force", layout.load_unit, "load_unit (--load-unit)", "N")
     length: Form = ("length", layout.x_unit, "x_unit (--x-unit)", None)
     if layout.step is not None:
         length = ("dimensionless", layout.x_unit, "x_unit (--x-unit)", "1")
@@ -331,7 +359,8 @@ def _wanted(
         "u_xz": channel,
         "u_yz": channel,
         "u_zz_errors": (of_u, None, "", u_unit),
-        "normal_load": ("force", layout.load_unit, "load_unit (--load-unit)", "N"),
+        "normal_load": force,
+        "tangential_load": force,
         "depth": ("", layout.depth_unit, "depth_unit (--depth-unit)", "1"),
         "x": length,
         "y": length,
@@ -341,7 +370,8 @@ def _wanted(
     for name, column in named.items():
         if column is None:
             continue
-        wanted[name] = Wanted(column, words=BRANCHES)
+        words = DIRECTIONS if name == "sliding_direction" else BRANCHES
+        wanted[name] = Wanted(column, words=words)
         form = name.partition(" of ")[0]  # of a sensor of an array
         if form in forms:
             dimension, unit, option, default = forms[form]
@@ -410,6 +440,11 @@ def _scan_of(
     del stated["noise"]  # that of each reading is a column
     load_scatter = stated.pop("load_scatter")
     x_error = stated.pop("x_error")
+    # An indenter that slides begins a pass where it turns, if no column numbers them.
+    signs = columns.get("sliding_direction", np.zeros(1))
+    turns = np.cumsum(np.diff(signs, prepend=signs[0]) != 0)
+    if turns.any() and "repeat" not in columns:
+        columns["repeat"] = turns
     loads_in_words = _numbered_by_load(columns, notes)
     stated["load"] = _nominal_load(columns.get("normal_load"), conditions.load, notes)
     if load_scatter is not None and "normal_load" not in columns:
@@ -533,7 +568,8 @@ def _lines(columns: Columns, numbering: Sequence[Column], notes: list[str]) -> N
 
 def _placed(columns: Columns, notes: list[str], name_rows: Callable[[Any], str]) -> Columns:
     """Leave out rows without a position or the number of a repeat; count the repeats from 0."""
-    stated = [columns[name] for name in ("x", "y", "repeat") if name in columns]
+    placed = ("x", "y", "repeat", "sliding_direction")
+    stated = [columns[name] for name in placed if name in columns]
     finite = np.logical_and.reduce([np.isfinite(values) for values in stated])
     if not finite.any():
         raise InputError("No row of the table has a position.", cure="Check the columns.")

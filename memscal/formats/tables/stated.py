@@ -23,7 +23,8 @@ class TableLayout:
     time_unit : str, optional
         Unit of the times, where the table states none.
     speed : float, optional
-        Where no column states positions: that of the stage, in m/s, which moves on with the time.
+        That of the stage, in m/s, which the scan keeps; where no column states positions it moves
+        on with the time.
     step : float, optional
         Length, in m, from each place to the next: ``x`` counts the places or, of a log with holds
         and without ``x``, the presses that a load or a depth tells are counted.
@@ -90,6 +91,8 @@ class ScanConditions:
         0 where a rod slides freely under the film, ``inf`` where it sticks.
     motion : str
         ``"rest"`` of a noise record: readings in time with nothing pressed, without positions.
+    sliding_friction, sliding_friction_uncertainty : float, optional
+        Tangential over normal load of a sliding indenter, where it was measured.
     averaging_length, dwell_time : float, optional
         Way over which each reading is the mean, in m; time at each place before it, in s.
     lubrication, lubricant : str
@@ -121,6 +124,8 @@ class ScanConditions:
     load: float | None = None
     rod_friction: float | None = None
     motion: str = ""
+    sliding_friction: float | None = None
+    sliding_friction_uncertainty: float | None = None
     averaging_length: float | None = None
     dwell_time: float | None = None
     lubrication: str = ""

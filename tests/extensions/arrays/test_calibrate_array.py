@@ -181,3 +181,10 @@ def test_dead_sensors_that_drift_are_dead(seed):
     many = memscal.Scan(x=scan.x, u_zz=u, sensors=[f"T{i}" for i in range(len(u))])
     found = sorted_readings(many, np.stack(scan.of_sensor(0).positions), u)
     np.testing.assert_array_equal(found.dead, np.arange(len(u)) >= 70)
+
+
+def test_a_rod_that_is_dragged_over_an_array_is_refused():
+    scan = replace(simulated_scan(1, 6, seed=1)[0], motion="sliding", sliding_direction=-1.0)
+    assert scan.of_sensor(3).directions == ("back",)
+    with pytest.raises(InputError, match="sliding indenter"):
+        memscal.calibrate_array(scan)
