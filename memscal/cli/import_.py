@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+import tomllib
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from datetime import datetime
@@ -19,14 +20,12 @@ from memscal.cli.options import (
     FREE_OR_STUCK,
     LAW,
     POSITION,
-    NonNegative,
     Options,
-    Quantity,
+    declared_options,
     film_from,
     film_options,
     indenter_from,
     laboratory_option,
-    motion_options,
     named,
     option,
     output_options,
@@ -49,7 +48,6 @@ _SHARED = ("r_unit", "sigma", "sigma_unit", "shear", "sign", "shear_sign", "valu
 _TABLE_ONLY = ("r",)
 _MESH_ONLY = ("vertical", "base", "centre")
 READING = ("sheet", "skip_rows", "missing", "delimiter", "decimal")
-_SIGN = click.Choice(["1", "-1"])
 
 
 def _read_reference(path: Path, mesh: bool, options: Options) -> ImportedProfile:
@@ -120,6 +118,18 @@ class _Time(click.ParamType):  # type: ignore[type-arg] # older releases of clic
         return value
 
 
+OPTIONS = tomllib.loads(Path(__file__).with_name("import_options.toml").read_text("utf-8"))
+"""Options, by what they are of."""
+KINDS = {
+    "file": FILE,
+    "figure": out.FigurePath(),
+    "time": _Time(),
+    "place": (POSITION, POSITION),
+    "pitch": click.FloatRange(0, min_open=True),
+    "count": click.IntRange(0),
+    "ordinal": click.IntRange(1),
+}
+"""What a value of theirs may be, beside a number in a unit, one of some choices, and text."""
 _INDENTER = ("indenter", "radius", "radius_uncertainty", "rod_friction", "indenter_name")
 _CELL_NAMES = {"name": "load_cell", "serial_number": "load_cell_serial"}
 _SENSOR_NAMES = {"name": "sensor_name", "model": "sensor_model", "channel": "channel"}
@@ -153,223 +163,13 @@ _NAMED = 12
     expose_value=False,
     metavar="recipe.toml",
 )("File (TOML) with what is not given here.")
-@option("--save-recipe", FILE, metavar="recipe.toml")(
-    "File to write what was given to, for --recipe of import and batch."
-)
-@option("--name-pattern", "PATTERN")(
-    "Scan: what the names of tables state, such as die_{row}_{col}: {row} and {col} the place on "
-    "the wafer (to FOLDER/manifest.csv); {sensor} its name, which is otherwise the table's; {any} "
-    "is skipped. {row:COLUMN} takes it from a column with one number."
-)
-@option("--die-pitch", click.FloatRange(0, min_open=True), nargs=2, metavar="MM MM")(
-    "Scan: distance of columns and of rows on the wafer, in mm.  [default: places count dies]"
-)
-@option("--resume", is_flag=True)(
-    "Several tables: keep scans that are there; other options than FOLDER/import.json has are "
-    "refused."
-)
-@option("--dry-run", is_flag=True)(
-    "Read every table, say what would be written, and write nothing."
-)
-@option("--format kind", click.Choice(["scan", "reference"]), "scan")(
-    "What it holds: measured points, or the base stress of a FEM calculation."
-)
-@option("--x", "COLUMN")("Scan: column of the position.")
-@option("--x-unit", "UNIT")(
-    "Scan: unit of the positions, such as mm.  [default: that of the column's head, x/mm]"
-)
-@option("--u", "COLUMN", multiple=True)(
-    "Scan: column of the normal channel's voltage or reading. May be repeated, and * stands for "
-    "any text: the columns of the sensors of an array, named as their heads without units. Frames "
-    "without positions need no import: memscal locate reads their table."
-)
-@option("--layout", FILE)(
-    "Scan of an array: table of where its sensors are, with the columns sensor, x and y (and "
-    "x_errors, y_errors, and board, the number of shared electronics), units in the heads, and one "
-    "row for each sensor."
-)
-@option("--u-unit --unit u_unit", "UNIT")(
-    "Scan: unit of the readings, of any kind, such as mV, pA, uT, Pa, or 1 of counts.  [default: "
-    "that of the column's head]"
-)
-@option("--y", "COLUMN")(
-    "Scan: column of the second position, of points in a plane, or of a line along y."
-)
-@option("--time", "COLUMN")("Scan: column of the time of each reading, which is kept.")
-@option("--time-unit", "UNIT")(
-    "Scan: unit of the times, s or ms.  [default: that of the column's head]"
-)
-@option("--speed", Quantity("mm/s", low=-float("inf")))(
-    "Scan: speed of the stage, in mm/s. Without --x the position is speed times time."
-)
-@option("--sliding", "forth|back|COLUMN")(
-    "Scan of an indenter that slid: forth, to larger x, or back, or the column that says it (1 or "
-    "forth, -1 or back). With --speed and --time positions go back with it."
-)
-@option("--tangential-load", "COLUMN")("Scan: column of the load along the line at each point.")
-@motion_options
-@option("--step", Quantity("mm"))(
-    "Scan: distance of neighbouring places, in mm. They are counted by --x or, with --holds and "
-    "without --x, by the presses of the load or the depth."
-)
-@option("--averaging-length", Quantity("mm"))(
-    "Scan: way over which each reading is the mean, in mm, centred on its position."
-)
-@option("--dwell dwell_time", NonNegative("s"))(
-    "Scan: how long the indenter was held at each place before its reading, in s."
-)
-@option("--noise-record motion", flag_value="rest")(
-    "Readings in time (--time) with nothing pressed, without --x: what --noise-record of other "
-    "commands takes."
-)
-@option("--u-errors", "COLUMN")("Scan: column of each reading's standard uncertainty.")
-@option("--noise", Quantity("unit of u"))(
-    "Scan: standard uncertainty of each reading, one number, in the unit of u."
-)
-@option("--holds", is_flag=True)(
-    "Scan: the table is a log in the order of time. Holds, where the indenter presses at rest, are "
-    "found, and each is averaged with its scatter."
-)
-@option("--depth", "COLUMN")(
-    "Holds: column that tells when the indenter presses: it grows as the indenter is lowered, or "
-    "is 1 where it presses and 0 elsewhere. It is not kept."
-)
-@option("--depth-unit", "UNIT")("Holds: unit of the depth.  [default: that of the column's head]")
-@option("--baseline", click.Choice(["before-each"]))(
-    "Holds: the reading before each press is subtracted from it."
-)
-@option("--figure", out.FigurePath(), multiple=True, metavar="FILE.png|svg|pdf")(
-    "Scan: the log with the holds that were found."
-)
-@option("--repeat", "COLUMN", multiple=True)(
-    "Scan: column that numbers the repeats. Repeated: each combination of the columns is a "
-    "line, such as of the load that was set and of the pass."
-)
-@option("--branch", "COLUMN")(
-    "Scan: column that says approach (or 1) where the indenter was loaded, retreat (or 2) where "
-    "it was unloaded."
-)
-@option("--u-xz", "COLUMN")("Scan: column of the channel xz.")
-@option("--u-yz", "COLUMN")("Scan: column of the channel yz.")
-@option("--load", Quantity("N"))(
-    "Normal load, in N.  [default: not stated; of a reference the force that it carries]"
-)
-@option("--value", Quantity("N"))(
-    "Reference without a load: the force, in N, that it is scaled to carry."
-)
-@option("--load-column", "COLUMN")("Scan: column of the load at each point.")
-@option("--load-unit", "UNIT")("Scan: unit of the column of loads.  [default: N]")
-@option("--load-uncertainty", NonNegative("N"))(
-    "Scan: standard uncertainty of the load common to all points, in N."
-)
-@option("--load-scatter", NonNegative("percent"))(
-    "Scan: standard uncertainty of each point's own load, independent from point to point, "
-    "in percent, such as of weights set down by hand."
-)
-@option("--position-error", NonNegative("um"))(
-    "Scan: standard uncertainty of each position, one for all repeats at it, in um."
-)
-@option("--position-errors-by-repeat", is_flag=True)(
-    "Scan: errors of positions are new in each repeat."
-)
-@option("--position-scale-uncertainty", NonNegative("percent"))(
-    "Scan: standard uncertainty of the stage's scale, common to all positions, in percent."
-)
-@option("--gain-uncertainty", NonNegative("percent"))(
-    "Scan: standard uncertainty of the gain of the sensor's chain, in percent."
-)
-@option("--gain-curvature-uncertainty", NonNegative("ratio"))(
-    "Scan: standard uncertainty of b, where a reading is U (1 - b U/Umax)."
-)
-@option("--roundness-uncertainty", NonNegative("ratio"))(
-    "Scan: standard uncertainty of the sensor's axis ratio, which is taken to be one."
-)
-@option("--line-offset-uncertainty", NonNegative("mm"))(
-    "Scan: standard uncertainty of the distance at which the line passes the sensor, in mm."
-)
-@option("--base-slip-uncertainty", NonNegative("ratio", high=1.0))(
-    "Scan: standard uncertainty of the film's slip on its base: 0 bonded, 1 free."
-)
-@option("--baseline-curvature-uncertainty", NonNegative("ratio"))(
-    "Scan: standard uncertainty of the baseline from edge to centre, over the largest signal."
-)
-@option("--shear-sensitivity-uncertainty", NonNegative("mm"))(
-    "Scan: standard uncertainty of the length by which the sensor responds to shear, in mm."
-)
-@option("--lubrication", click.Choice(["dry", "lubricated"]))(
-    "Scan: what was between indenter and film."
-)
-@option("--lubricant", "TEXT")("Scan: name of the lubricant.")
-@option("--u-sign", _SIGN)(
-    "Scan: -1 where the voltage falls when the indenter presses.  [default: 1]"
-)
-@option("--ceiling", Quantity("unit of u"))(
-    "Scan: end of amplifier or converter, in the unit of u, after --u-sign: readings at or above "
-    "it are left out."
-)
-@option("--sensor-name", "TEXT")("Scan: name of the sensor.")
-@option("--sensor-model", "TEXT")("Scan: model of the sensor.")
-@option("--channel", "TEXT")("Scan: name of the channel.  [default: zz]")
-@option("--load-cell", "TEXT")(
-    "Scan: name of the load cell or balance; its common error counts once where calibration and "
-    "contacts name the same one."
-)
-@option("--load-cell-serial", "TEXT")("Scan: serial number of the load cell.")
-@option("--title", "TEXT")("Scan: title.")
-@option("--start-time", _Time())("Scan: when it began, 2026-11-20 or 2026-11-20T09:30:00+01:00.")
+@declared_options(OPTIONS["scan"], KINDS)
 @laboratory_option("Scan: ")
-@option("--r", "COLUMN")("Reference: column of the radius.")
-@option("--r-unit", "UNIT")(
-    "Reference: unit of the radius, or of a mesh's coordinates, such as mm."
-)
-@option("--sigma", "COLUMN|FIELD")(
-    "Reference: column of the normal stress at the base; in a mesh the field of it, "
-    "or of the stress tensor, and FIELD:2 is its component 2."
-)
-@option("--sigma-unit", "UNIT")("Reference: unit of the stresses, such as MPa.")
-@option("--shear", "COLUMN|FIELD")(
-    "Reference: the radial shear stress; in a mesh a stress tensor's own by default."
-)
-@option("--sign", _SIGN)(
-    "Reference: -1 where compression is negative.  [default: 1 for a table, -1 for a mesh]"
-)
-@option("--shear-sign", _SIGN)(
-    "Reference: -1 where the shear is the stress component S13 with axis 3 from the "
-    "base to the surface; 1 where it is the base's traction on the film, positive outward."
-    "  [default: 1 for a table; for a mesh S13, whichever way its axis points]"
-)
-@option("--solver", "TEXT")("Reference: the program that calculated it.")
-@option("--vertical", click.Choice(["x", "y", "z"]))(
-    "Mesh: axis across the film.  [default: the second of a section's two; z in 3-D]"
-)
-@option("--base", POSITION)(
-    "Mesh: position of the base on that axis, in mm.  [default: the lowest]"
-)
-@option("--centre", (POSITION, POSITION), metavar="MM MM")(
-    "Mesh in 3-D: where the indenter's axis meets the base, in mm.  [default: 0 0]"
-)
-@option("--indenter", click.Choice(["rod", "sphere"]))("Shape of the indenter.  [default: rod]")
+@declared_options(OPTIONS["reference"], KINDS)
 @radius_options("the rod or of the sphere's curvature")
-@option("--indenter-name", "TEXT")(
-    "Scan: name of the indenter; calibrations by the same one share the error of its radius."
-)
 @film_options()
-@option("--film-name", "TEXT")(
-    "Scan: name of the film; calibrations through the same one share what is not known of it."
-)
 @rod_friction_option(FREE_OR_STUCK)
-@option("--sheet", "NAME")("Sheet of a workbook.  [default: the first that is visible]")
-@option("--scan", click.IntRange(1), metavar="N")(
-    "Scan: which one of a file of SPEC or Bluesky: the number after #S, or counted from 1."
-)
-@option("--skip-rows", click.IntRange(0), metavar="N")(
-    "Lines before the header, or the first reading.  [default: found from the table]"
-)
-@option("--missing", "WORD", multiple=True)(
-    "A word, or a number such as -9999, that means a missing value, besides those below."
-)
-@option("--delimiter", "CHAR")("What separates columns, or TAB; found from the table by default.")
-@option("--decimal", click.Choice([".", ","]))("Decimal mark; found from the table by default.")
+@declared_options(OPTIONS["table"], KINDS)
 @output_options
 @click.pass_context
 def command(

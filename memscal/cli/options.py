@@ -152,6 +152,28 @@ def options_of(*options: _Adder) -> _Adder:
     return add
 
 
+def declared_options(rows: Iterable[Options], kinds: Mapping[str, Any]) -> _Adder:
+    """Return the options that rows of a file declare, with the kinds of values that it names."""
+    return options_of(*(_declared(kinds, **row) for row in rows))
+
+
+def _declared(
+    kinds: Mapping[str, Any],
+    names: str,
+    about: str,
+    kind: str = "",
+    number: Options | None = None,
+    choices: Sequence[str] = (),
+    **settings: Any,
+) -> _Adder:
+    value = kinds.get(kind)
+    if number:
+        value = Quantity(**number)
+    elif choices:
+        value = click.Choice(choices)
+    return option(names, value, **settings)(about)
+
+
 out_option = option("-o --output", FILE, metavar="OUT")
 """The option of the file to write, once its text says what that is."""
 
@@ -301,34 +323,6 @@ def _measured(
     return options_of(
         *(option(f"--{name}", kind, defaults.get(name))(about) for name, kind, about in options)
     )
-
-
-motion_options = _measured(
-    (
-        (
-            "sliding-friction",
-            NonNegative("ratio"),
-            "Scan: tangential over normal load of the sliding indenter, where it was measured.",
-            "the sliding friction.",
-        ),
-        (
-            "low-pass",
-            Quantity("Hz"),
-            "Scan: corner of the low-pass of one pole that the readings went through, in Hz.",
-            "the corner of the low-pass, in Hz.",
-        ),
-        (
-            "resonance",
-            Quantity("Hz"),
-            "Scan: resonance of the sensor, in Hz, with --quality.",
-            "the resonance, in Hz.",
-        ),
-        ("quality", Quantity("ratio"), "Scan: quality of the resonance.", "the quality."),
-    ),
-    _NO_DEFAULTS,
-    uncertainties=True,
-)
-"""The friction of an indenter that slides, and how the sensor follows it in time."""
 
 
 def film_from(options: Options, otherwise: str = "") -> ElasticFilm:

@@ -72,7 +72,6 @@ STATED_ERRORS = (
 BRANCHES = {"approach": 1, "retreat": 2}
 """Numbers of the indenter's branches; 0 where none is stated."""
 
-_ONE_WAY = "The stress under an indenter that slides forth is not that of one that slides back."
 #: One value of these is that of a whole row, or of all.
 _BY_ROW = ("branch", "sliding_direction")
 #: Points that spread by less of their length across it are a line.
@@ -557,8 +556,8 @@ class Scan:
     @property
     def directions(self) -> tuple[str, ...]:
         """In which of ``"forth"`` and ``"back"`` a sliding indenter moved; none if not stated."""
-        signs = self.sliding_direction
-        return tuple(word for word, sign in DIRECTIONS.items() if np.any(signs == sign))
+        held = DIRECTIONS.items()
+        return tuple(word for word, sign in held if np.any(self.sliding_direction == sign))
 
     def only_direction(self, direction: str | None) -> Scan:
         """Return the passes of a direction, which may be left out where the scan has not two."""
@@ -569,7 +568,7 @@ class Scan:
             raise InputError(
                 f"The indenter slid {' and '.join(held) or 'in no stated direction'}, and "
                 f"{direction or 'no direction'} is chosen.",
-                why=_ONE_WAY,
+                why="Forth the stress under it is not that of the way back.",
                 cure="Choose one of those of the scan: direction='forth' or 'back' (--direction).",
             )
         slid = self.passes[self.sliding_direction == DIRECTIONS[direction]]
@@ -577,7 +576,6 @@ class Scan:
         if passes.directions != (direction,):
             raise InputError(
                 "A pass of the scan holds both directions of sliding.",
-                why=_ONE_WAY,
                 cure="Number the passes (repeat, --repeat COLUMN), or give each direction as a "
                 "scan of its own.",
             )

@@ -103,23 +103,16 @@ def test_a_sliding_scan_and_a_slow_sensor_are_stated_on_the_command_line(run, fo
     lines = [f"{0.5 * i},{abs(8 - i)},{0.3 * i},{1 if i < 8 else -1}" for i in range(17)]
     (folder / "slid.csv").write_text("\n".join(["t/s,U/mV,Q/N,way", *lines]), encoding="utf-8")
     made = "import slid.csv -o slid.h5 --time t --speed 2 --u U --sliding way --tangential-load Q"
-    given = "--sliding-friction 0.3 --sliding-friction-uncertainty 0.02 --low-pass 5 --resonance 90"
-    slow = "--quality 8 --quality-uncertainty 0.5"
-    run(*made.split(), *given.split()).exits(3, "resonance, but no quality")
+    given = "--sliding-friction 0.3 --sliding-friction-uncertainty 0.02 --low-pass 5"
+    slow = "--low-pass-uncertainty 0.1 --quality 8 --quality-uncertainty 0.5"
+    run(*made.split(), *slow.split(), "--low-pass", "5").exits(3, "quality, but no resonance")
     lab = folder / "lab.toml"
-    lab.write_text("sensor.creep_share = 0.05\nsensor.creep_time = 2.0\n")
-    run(*made.split(), *given.split(), *slow.split(), "--lab", "lab.toml").exits(0)
+    lab.write_text("sensor.resonance = 90.0\nsensor.quality = 8.0\n")
+    run(*made.split(), *given.split(), "--lab", "lab.toml").exits(0)
     scan = memscal.read_scan("slid.h5")
     assert (scan.motion, scan.speed, scan.x.max()) == ("sliding", 2e-3, 7e-3)
     assert (scan.sliding_friction, scan.sliding_friction_uncertainty) == (0.3, 0.02)
-    assert scan.sensor.dynamics == memscal.Dynamics(
-        low_pass=5.0,
-        resonance=90.0,
-        quality=8.0,
-        quality_uncertainty=0.5,
-        creep_share=0.05,
-        creep_time=2.0,
-    )
+    assert scan.sensor.dynamics == memscal.Dynamics(low_pass=5.0, resonance=90.0, quality=8.0)
     lab.write_text("sensor.low_pass = 6.0\n")
     contradicted = (*made.split(), "--low-pass", "5", "--lab", "lab.toml", "--force")
     run(*contradicted).exits(3, "low pass of the sensor is 6.0 in lab.toml")

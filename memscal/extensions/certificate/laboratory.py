@@ -17,7 +17,6 @@ from memscal.model.apparatus import ApparatusData
 from memscal.model.arrays import Values
 from memscal.model.instrument import Dynamics
 from memscal.model.quantities import ESTIMATED
-from memscal.model.records import DYNAMICS
 from memscal.model.scan import STATED_ERRORS, Scan
 
 _LONGEST = 1 << 20
@@ -51,9 +50,8 @@ _KEYS = {
     "laboratory": f"name* {_ADDRESS} accreditation prefix:code number:code",
     "customer": f"name* {_ADDRESS}",
     "person": "name* role* operator",
-    "sensor": " ".join(
-        ["name* model manufacturer* serial*", *(f"{q.name}:number" for q in DYNAMICS.quantities)]
-    ),
+    "sensor": "name* model manufacturer* serial* low_pass:number low_pass_uncertainty:number "
+    "resonance:number resonance_uncertainty:number quality:number quality_uncertainty:number",
     "film": "name",
     "indenter": "name",
     "equipment": "name* kind:kind serial* certificate* date*:date",

@@ -190,7 +190,7 @@ def import_table(
         "u_zz_errors": u_errors,
         "normal_load": load_column,
         "tangential_load": tangential_load,
-        "sliding_direction": sliding if direction is None else None,
+        "sliding_direction": None if direction else sliding,
         "depth": depth,
         "x": x,
         "y": y,
@@ -209,7 +209,7 @@ def import_table(
     _require_use(named, layout, conditions, uncertainties)
     wanted, reading = _wanted(table, named, layout)
     columns, notes = _read_columns(table, wanted, layout.u_sign, uncertainties.noise)
-    if direction is not None:
+    if direction:
         columns["sliding_direction"] = np.full(columns["u_zz"].shape, direction)
     if array:
         notes += hook("add_up")(columns, layout)
@@ -568,8 +568,8 @@ def _lines(columns: Columns, numbering: Sequence[Column], notes: list[str]) -> N
 
 def _placed(columns: Columns, notes: list[str], name_rows: Callable[[Any], str]) -> Columns:
     """Leave out rows without a position or the number of a repeat; count the repeats from 0."""
-    placed = ("x", "y", "repeat", "sliding_direction")
-    stated = [columns[name] for name in placed if name in columns]
+    needed = ("x", "y", "repeat", "sliding_direction")
+    stated = [columns[name] for name in needed if name in columns]
     finite = np.logical_and.reduce([np.isfinite(values) for values in stated])
     if not finite.any():
         raise InputError("No row of the table has a position.", cure="Check the columns.")
