@@ -313,9 +313,12 @@ def command(
     output = output or out.default_name(scans[0], ending)
     settings = calibration_settings(reference=reference, alternative=alternative, **settings)
     data = _read(scans, reference, noise_record, settings)
-    inputs = [*scans, reference, alternative, noise_record, settings["creep"]]
     outputs = list(filter(None, (output, report, *figures, sweep_figure)))
-    out.prove_writable(outputs, force=force, inputs=inputs)
+    out.prove_writable(
+        outputs,
+        force=force,
+        inputs=[*scans, reference, alternative, noise_record, settings["creep"]],
+    )
     if dry_run:
         _rehearse(data, settings, outputs, as_json)
         return DONE

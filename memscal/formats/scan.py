@@ -79,14 +79,9 @@ def read_scan(path: FilePath, *, accept_altered: bool = False) -> Scan:
         return scan_from(file)
 
 
-def scan_from(file: SafeFile, most: int | None = None) -> Scan:
-    """Read the scan of an open memscal-scan file; one of more than ``most`` points is refused."""
-    require_schema(file, writer.SCAN_SCHEMA)
-    return scan_in(file, most)
-
-
-def scan_in(file: SafeFile, most: int | None = None) -> Scan:
-    """Read the scan that an open file holds, whatever its schema is."""
+def scan_from(file: SafeFile, most: int | None = None, schema: str = writer.SCAN_SCHEMA) -> Scan:
+    """Read the scan of an open file of a schema; one of more than ``most`` points is refused."""
+    require_schema(file, schema)
     if most is not None:
         size = file.claimed_number(_SIGNAL)
         if size > most:

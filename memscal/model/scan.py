@@ -104,8 +104,10 @@ def require_pressed(motion: str, source: SourceFile | None) -> None:
     """Refuse the scan of an indenter that slid, and one of none, at rest."""
     if motion == "rest":
         raise InputError(
-            f"{source.file_name if source else 'The scan'} is a noise record: nothing was pressed.",
-            cure="Give it beside a scan (noise_record, --noise-record).",
+            f"{source.file_name if source else 'The scan'} is a noise record or a dwell record.",
+            why="It has readings in time at one place, and no positions.",
+            cure="Give a noise record beside a scan (noise_record, --noise-record), and a dwell "
+            "record, which states its indenter, to memscal creep.",
         )
     if motion == "sliding":
         raise InputError(
@@ -322,7 +324,8 @@ class Scan:
         (``u_xz_errors``, ``u_yz_errors``).
     motion : str
         ``"pressed"`` at each place, which an empty one stands for, or ``"sliding"``; ``"rest"``
-        of a noise record, readings in time with nothing pressed, whose positions are zero.
+        of a noise record, readings in time with nothing pressed, whose positions are zero, and of
+        a dwell record, the same under an ``indenter``.
     sliding_direction : ndarray, shape of ``u_zz``, optional
         1 where a sliding indenter moved along the positions, -1 where against them; one value, and
         one for each row of a ``u_zz`` of two axes, are accepted.

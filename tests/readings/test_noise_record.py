@@ -115,7 +115,7 @@ def timed(times):
         (lambda: noise_of(record(np.full(300, 1e-3))), "are equal"),
         (lambda: noise_of(record(np.arange(20.0))), "even steps"),
         (lambda: noise_of(record(np.r_[U, np.full(50, np.nan), U])), "even steps"),
-        (lambda: memscal.calibrate(record(U)), "noise record: nothing was pressed"),
+        (lambda: memscal.calibrate(record(U)), "is a noise record or a dwell record"),
         (lambda: timed(np.r_[np.nan, 1:65]), "no time of 1 reading,"),
         (lambda: timed(np.full(65, np.nan)), "no time of 65 readings"),
         (lambda: timed(np.r_[0:64, 63]), "of 1 that of another"),
