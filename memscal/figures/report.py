@@ -310,6 +310,7 @@ def _setting(
     """Return sensor, indenter, film and reference as a table of items and values."""
     indenter = holder.indenter
     rows = [*_stated("", records.SENSOR, holder.sensor)]
+    rows += _stated("sensor, ", records.DYNAMICS, holder.sensor.dynamics)
     if load is not None:
         rows.append(("load", f"{load:.4g} N"))
     rows += _stated("", records.LOAD_CELL, getattr(holder, "load_cell", None))

@@ -22,7 +22,7 @@ from memscal.model.holds import Holds
 from memscal.model.indenter import Rod, RoundIndenter
 from memscal.model.notation import Reading, format_measured
 from memscal.model.quantities import dimension_in
-from memscal.model.records import FILM, LOAD, ROUND_INDENTER, TAKEN_FOR_GRANTED
+from memscal.model.records import DYNAMICS, FILM, LOAD, ROUND_INDENTER, TAKEN_FOR_GRANTED
 from memscal.model.scan import BRANCHES, DIRECTIONS, ArrayOptions, Scan, branch_numbers, load_groups
 from memscal.progress import Listener, reported
 from memscal.readings.ceiling import without_clipped
@@ -521,6 +521,7 @@ def _set_up_in_words(stated: Mapping[str, Any]) -> Iterator[str]:
         (shape, indenter, ROUND_INDENTER),
         ("pressed with", SimpleNamespace(**stated), LOAD),
         ("film", film, FILM),
+        ("sensor", stated["sensor"].dynamics, DYNAMICS),
     ):
         words = []
         for quantity in record.quantities:
@@ -532,7 +533,8 @@ def _set_up_in_words(stated: Mapping[str, Any]) -> Iterator[str]:
                 scale = quantity.scale
                 value = format_measured(value / scale, u and u / scale, quantity.unit)
             words.append(f"{quantity.words} {value}")
-        yield f"{name.capitalize()}: {', '.join(words) or 'not stated'}."
+        if words or record is not DYNAMICS:
+            yield f"{name.capitalize()}: {', '.join(words) or 'not stated'}."
 
 
 def _granted_in_words(stated: Mapping[str, Any]) -> Iterator[str]:
