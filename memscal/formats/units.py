@@ -156,7 +156,7 @@ def dimension_of(unit: str, where: str) -> str:
     for dimension, units in DIMENSIONS.items():
         if units.stored == unit:
             return dimension
-    for dimension in SI_UNITS:
+    for dimension in DIMENSIONS:
         try:
             _pint_factor(unit, dimension, where)
         except UnitError:

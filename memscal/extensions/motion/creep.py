@@ -27,7 +27,13 @@ from memscal.formats.tables.scan import ImportedScan
 from memscal.measurement.restore import place_of
 from memscal.model.apparatus import ParameterSet
 from memscal.model.arrays import ArrayPair, FloatArray, keyword_array_record
-from memscal.model.checks import QualityChecks, added_check, check, chi_square_limit
+from memscal.model.checks import (
+    QualityChecks,
+    added_check,
+    check,
+    chi_square_limit,
+    state_of_checks,
+)
 from memscal.model.instrument import Dynamics
 from memscal.model.notation import VOLTS
 from memscal.model.provenance import Process
@@ -174,9 +180,9 @@ def _readings(record: Scan) -> ArrayPair:
         )
     moment = record.time + 0 * record.u_zz  # NaN where either is missing
     order = np.argsort(moment)[: np.isfinite(moment).sum()]
-    time = moment[order] - np.nanmin(moment)
+    time = moment[order] - moment[order[:1]]
     u = record.u_zz[order]
-    if u.size < _FEWEST or not np.ptp(time) * np.ptp(u):
+    if u.size < _FEWEST or not time[-1] * np.ptp(u):
         raise InputError(
             f"{place_of(record)} has fewer than {_FEWEST} readings, or all are equal.",
             cure="Record for longer, or with more digits.",
@@ -199,6 +205,7 @@ def _further(time: FloatArray, u: FloatArray, *columns: FloatArray) -> tuple[flo
 
 def write_creep(creep: Creep, path: Path, *, overwrite: bool = False) -> None:
     """Write a creep as a memscal-creep file."""
+    # The scan enters the unit of its readings.
     children = {
         **scan_entry(creep.record).children,
         "parameters": groups.parameter_group(creep.parameters, {}),
@@ -241,5 +248,6 @@ def with_creep(scans: tuple[Scan, ...], request: Request) -> tuple[tuple[Scan, .
     # All scans are of one sensor.
     corrected = [replace(s, sensor=replace(s.sensor, dynamics=dynamics)) for s in scans]
     file = creep.record.source
-    named = file and f"{file.file_name} (sha256 {file.sha256}) {file.altered}".strip()
+    checked = state_of_checks(creep.checks)
+    named = file and f"{file.file_name} (sha256 {file.sha256}): {checked} {file.altered}".strip()
     return tuple(corrected), replace(request, creep=named)
