@@ -559,8 +559,9 @@ class Scan:
     @property
     def directions(self) -> tuple[str, ...]:
         """In which of ``"forth"`` and ``"back"`` a sliding indenter moved; none if not stated."""
-        held = DIRECTIONS.items()
-        return tuple(word for word, sign in held if np.any(self.sliding_direction == sign))
+        return tuple(
+            word for word, sign in DIRECTIONS.items() if np.any(self.sliding_direction == sign)
+        )
 
     def only_direction(self, direction: str | None) -> Scan:
         """Return the passes of a direction, which may be left out where the scan has not two."""
@@ -708,6 +709,15 @@ class Scan:
                 raise InputError(
                     f"{name} holds an infinite value.", cure="Mark missing points with NaN."
                 )
+        signs = self.sliding_direction
+        if signs is not None and (self.motion != "sliding" or np.any(np.abs(signs) != 1)):
+            raise InputError(
+                f"The scan has directions of sliding, {np.unique(signs)}, and its motion is "
+                f"{self.motion or 'pressed'}.",
+                why="An indenter that slides moves along the positions, 1, or against them, -1.",
+                cure="Give the motion 'sliding' (/entry/indenter/motion) and directions of 1 and "
+                "-1 (/entry/data/direction), or no directions.",
+            )
         for name in ("u_zz_errors", "normal_load_errors"):
             errors = getattr(self, name)
             if errors is not None and np.any((errors < 0) | np.isinf(errors)):
@@ -734,8 +744,7 @@ class Scan:
                 f"The direction of the scan is {self.direction!r}.",
                 cure="A line scan runs along 'x' or 'y'; a raster has its own y.",
             )
-        with_errors = ("load", "sliding_friction", *STATED_ERRORS)
-        errors = [f"{name}_uncertainty" for name in with_errors]
+        errors = [f"{name}_uncertainty" for name in ("load", "sliding_friction", *STATED_ERRORS)]
         for name in (*errors, "averaging_length", "dwell_time", "speed", "sliding_friction"):
             require_non_negative(f"{name.replace('_', ' ')} of the scan", getattr(self, name))
         record = self.noise_record
@@ -760,15 +769,6 @@ class Scan:
             raise InputError(
                 f"The motion of the indenter is {self.motion!r}.",
                 cure="Give 'pressed' or 'sliding' (/entry/indenter/motion), or leave it out.",
-            )
-        signs = self.sliding_direction
-        if signs is not None and (self.motion != "sliding" or np.any(np.abs(signs) != 1)):
-            raise InputError(
-                f"The scan has directions of sliding, {np.unique(signs)}, and its motion is "
-                f"{self.motion or 'pressed'}.",
-                why="An indenter that slides moves along the positions, 1, or against them, -1.",
-                cure="Give the motion 'sliding' (/entry/indenter/motion) and directions of 1 and "
-                "-1 (/entry/data/direction), or no directions.",
             )
         if self.lubricant and self.lubrication != "lubricated":
             stated = self.lubrication or "not stated"

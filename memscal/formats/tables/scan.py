@@ -179,9 +179,6 @@ def import_table(
     layout = layout or TableLayout()
     conditions = conditions or ScanConditions()
     uncertainties = uncertainties or ScanUncertainties()
-    direction = DIRECTIONS.get(str(sliding))
-    if sliding is not None:
-        conditions = replace(conditions, motion="sliding")
     readings = _listed(u)
     named = {
         "u_zz": next(iter(readings), None),
@@ -190,7 +187,7 @@ def import_table(
         "u_zz_errors": u_errors,
         "normal_load": load_column,
         "tangential_load": tangential_load,
-        "sliding_direction": None if direction else sliding,
+        "sliding_direction": None if str(sliding) in DIRECTIONS else sliding,
         "depth": depth,
         "x": x,
         "y": y,
@@ -199,7 +196,6 @@ def import_table(
     }
     numbering = _listed(repeat)
     named |= {f"repeat {i}": column for i, column in enumerate(numbering)}
-    require_sign("sign of the voltage", layout.u_sign)
     asked = named | {f"reading {i}": column for i, column in enumerate(readings)}
     table = open_table(source, asked, **{name: getattr(layout, name) for name in _READING})
     named |= table.defaults
@@ -208,9 +204,7 @@ def import_table(
     array = any(" of " in name for name in named)
     _require_use(named, layout, conditions, uncertainties)
     wanted, reading = _wanted(table, named, layout)
-    columns, notes = _read_columns(table, wanted, layout.u_sign, uncertainties.noise)
-    if direction:
-        columns["sliding_direction"] = np.full(columns["u_zz"].shape, direction)
+    columns, notes = _read_columns(table, wanted, layout.u_sign, uncertainties.noise, str(sliding))
     if array:
         notes += hook("add_up")(columns, layout)
     presses = make_positions(columns, layout, notes, table.lines)
@@ -336,6 +330,7 @@ def _require_use(
     ):
         if useless:
             raise InputError(problem, cure=cure)
+    require_sign("sign of the voltage", layout.u_sign)
     require_positions(named, layout, resting=conditions.motion == "rest")
 
 
@@ -382,9 +377,13 @@ def _wanted(
 
 
 def _read_columns(
-    table: NamedColumns, wanted: Mapping[str, Wanted], u_sign: int, noise: float | None
+    table: NamedColumns,
+    wanted: Mapping[str, Wanted],
+    u_sign: int,
+    noise: float | None,
+    sliding: str,
 ) -> tuple[Columns, list[str]]:
-    """Read columns, with the sign and the noise that are stated; return them with notes."""
+    """Read columns, with sign, noise and direction that are stated; return them with notes."""
     columns: Columns = table.columns(wanted)
     units = ", ".join(f"{name} in {item.unit}" for name, item in wanted.items() if item.unit)
     notes = [*table.notes, f"Units: {units}."]
@@ -395,6 +394,8 @@ def _read_columns(
     if noise is not None:
         in_si = to_si(noise, u.unit, u.dimension, "noise")
         columns["u_zz_errors"] = np.full(columns["u_zz"].shape, in_si)
+    if sliding in DIRECTIONS:
+        columns["sliding_direction"] = np.full(columns["u_zz"].shape, DIRECTIONS[sliding])
     if "branch" in columns:
         where = table.where(wanted["branch"].column)
         columns["branch"] = branch_numbers(where, np.nan_to_num(columns["branch"]))
@@ -440,11 +441,12 @@ def _scan_of(
     del stated["noise"]  # that of each reading is a column
     load_scatter = stated.pop("load_scatter")
     x_error = stated.pop("x_error")
-    # An indenter that slides begins a pass where it turns, if no column numbers them.
-    signs = columns.get("sliding_direction", np.zeros(1))
-    turns = np.cumsum(np.diff(signs, prepend=signs[0]) != 0)
-    if turns.any() and "repeat" not in columns:
-        columns["repeat"] = turns
+    if "sliding_direction" in columns:
+        stated["motion"] = "sliding"
+        # Where the indenter turns a pass begins, if no column numbers them.
+        turns = np.diff(columns["sliding_direction"]) != 0
+        if turns.any() and "repeat" not in columns:
+            columns["repeat"] = np.append(0, np.cumsum(turns))
     loads_in_words = _numbered_by_load(columns, notes)
     stated["load"] = _nominal_load(columns.get("normal_load"), conditions.load, notes)
     if load_scatter is not None and "normal_load" not in columns:
@@ -570,8 +572,9 @@ def _lines(columns: Columns, numbering: Sequence[Column], notes: list[str]) -> N
 
 def _placed(columns: Columns, notes: list[str], name_rows: Callable[[Any], str]) -> Columns:
     """Leave out rows without a position or the number of a repeat; count the repeats from 0."""
-    needed = ("x", "y", "repeat", "sliding_direction")
-    stated = [columns[name] for name in needed if name in columns]
+    stated = [
+        columns[name] for name in ("x", "y", "repeat", "sliding_direction") if name in columns
+    ]
     finite = np.logical_and.reduce([np.isfinite(values) for values in stated])
     if not finite.any():
         raise InputError("No row of the table has a position.", cure="Check the columns.")
