@@ -20,6 +20,7 @@ from scipy.special import j0
 
 import memscal
 from memscal import Dynamics
+from memscal.extensions.motion.creep import creep_of
 
 COUNT = 40 if FULL else 6
 CHANCE = 1e-3
@@ -305,3 +306,29 @@ def test_a_slow_sensor_is_calibrated_as_if_it_were_still(made, dynamics, speed):
             errors.append([*ratios, found["centre"] / 1e-3 + 1])
     # Pairs of opposite noise: what is left of it is of second order.
     assert (np.abs(np.mean(errors, axis=0) - 1) < [0.002, 0.004, 0.003]).all()
+
+
+@pytest.mark.parametrize(
+    ("speed", "wrong"), [(1e-3, (0.0155, 0.032)), (FAST, (-0.0475, 0.003))], ids=["slow", "fast"]
+)
+def test_the_creep_of_a_dwell_record_corrects_a_calibration(speed, wrong, seed):
+    rng = np.random.default_rng(seed)
+    time = np.arange(1200) / 20
+    u = 1 - 0.05 * np.exp(-time) + 0.002 * rng.standard_normal(time.size)
+    rod = memscal.Rod(radius=ROD.radius)
+    record = memscal.Scan(x=0 * u, u_zz=u, time=time, motion="rest", indenter=rod)
+    noise = 0.001 * still(ROD).max()
+    scatter = noise * rng.standard_normal(X.size)
+    film = replace(EXACT, law="linear")
+
+    def found(dynamics, **options):
+        u, given = one_way(dynamics, speed)
+        scan = scan_of(u + scatter, noise, None, film=film, indenter=rod, load=ROD.load, **given)
+        apparatus = memscal.calibrate(scan, other=False, **options).apparatus
+        return np.array([apparatus.conversion_constant, apparatus.gaussian_sigma])
+
+    true = found(Dynamics())
+    # The noise of the record leaves 0.09 % of A and 0.06 % of sigma.
+    corrected = found(CREEP, creep=creep_of(record)) / true
+    assert (np.abs(corrected - 1) < [0.002 + 0.0035, 0.004 + 0.0025]).all()
+    assert found(CREEP) / true - 1 == pytest.approx(wrong, abs=0.005)
