@@ -210,8 +210,8 @@ def test_a_sentinel_of_any_size_anywhere_moves_neither_route(places, sentinel, n
 
 
 def test_a_dragged_rod_is_refused_with_a_reference_of_its_own_too():
-    scan = replace(SCAN, motion="sliding", sliding_direction=1.0)
-    own = press_rod(scan.film, scan.indenter, 1.0).profile(np.linspace(0.0, 20e-3, 200))
-    for dragged, reference in ((scan, None), (scan, "point"), (replace(scan, reference=own), None)):
+    own = press_rod(SCAN.film, SCAN.indenter, 1.0).profile(np.linspace(0.0, 20e-3, 200))
+    dragged = replace(SCAN, motion="sliding", sliding_direction=1.0, reference=own)
+    for reference in (None, "point"):
         with pytest.raises(memscal.MemscalError, match="sliding indenter"):
             memscal.calibrate(dragged, reference=reference)

@@ -593,40 +593,37 @@ def test_a_hold_of_which_a_row_is_at_the_ceiling_is_left_out(digit, ceiling, sta
 
 
 # Forth, a turn without a direction, and back, at 2 mm/s.
-SLID = {"t (s)": np.arange(7.0), "U (mV)": np.arange(7.0), "Q [N]": 0.1 * np.arange(7.0)}
-SLID |= {"way": ["Forth", "forth", "forth", "", "back", "back", "back"], "x [mm]": np.arange(7.0)}
+SLID = {"U (mV)": np.arange(7.0), "way": ["Forth", "forth", "forth", "", "back", "back", "back"]}
+MOVED = {"u": "U", "time": "t", "layout": TableLayout(speed=2e-3)}
 
 
-def test_a_sliding_log_goes_back_where_it_turns_and_each_way_is_a_pass():
-    at = {"u": "U", "time": "t", "sliding": "way", "layout": TableLayout(speed=2e-3)}
-    scan = import_table(SLID, **at, tangential_load="Q")
-    np.testing.assert_allclose(scan.x, 1e-3 * np.array([0, 2, 4]), atol=1e-12)
-    np.testing.assert_allclose(scan.u_zz, 1e-3 * np.array([[0, 1, 2], [6, 5, 4]]))
-    np.testing.assert_array_equal(scan.sliding_direction, [[1, 1, 1], [-1, -1, -1]])
-    np.testing.assert_allclose(scan.tangential_load, [[0, 0.1, 0.2], [0.6, 0.5, 0.4]])
-    assert scan.motion == "sliding"
-    assert scan.speed == 2e-3
-    times = {**SLID, "t (s)": [0, 1, np.nan, 3, 4, 5, 6]}
-    gap = import_table(times, **at)
-    # Until the turn, one step after the reading without a time, and from it half steps are made.
-    np.testing.assert_allclose(gap.x, 1e-3 * np.array([0, 2, 3, 1, -1]), atol=1e-12)
-    np.testing.assert_array_equal(gap.passes, [0, 0, 1, 1, 1])
+@pytest.mark.parametrize(
+    ("times", "x", "passes"),
+    [
+        ([0, 1, 2, 3, 4, 5, 6], [0, 2, 4, 4, 2, 0], [0, 0, 0, 1, 1, 1]),
+        # From a reading forth to the turn half of the time is forth, of 2 s 2 mm.
+        ([0, 1, np.nan, 3, 4, 5, 6], [0, 2, 3, 1, -1], [0, 0, 1, 1, 1]),
+    ],
+)
+def test_a_sliding_log_goes_back_where_it_turns_and_each_way_is_a_pass(times, x, passes):
+    scan = import_table({**SLID, "t (s)": times}, **MOVED, sliding="way")
+    order = np.argsort(scan.time, axis=None)
+    np.testing.assert_allclose(scan.positions[0].flat[order], 1e-3 * np.array(x), atol=1e-12)
+    np.testing.assert_array_equal(scan.passes.flat[order], passes)
+    np.testing.assert_array_equal(scan.sliding_direction.flat[order], 1 - 2 * np.array(passes))
+    assert (scan.motion, scan.speed) == ("sliding", 2e-3)
 
 
 @pytest.mark.parametrize(("word", "sign"), [("forth", 1.0), ("back", -1.0)])
 def test_one_direction_is_that_of_all_readings(word, sign):
-    moved = import_table(SLID, u="U", time="t", sliding=word, layout=TableLayout(speed=2e-3))
-    np.testing.assert_allclose(moved.x, 2e-3 * sign * np.arange(7.0), atol=1e-12)
-    placed = import_table(SLID, u="U", x="x", sliding=word, layout=TableLayout(speed=2e-3))
-    assert placed.kind == moved.kind == "line"
-    assert placed.speed == 2e-3
-    assert placed.directions == moved.directions == (word,)
-    given = Scan.from_arrays(placed.x, placed.u_zz, sliding=word, sliding_friction=0.2)
-    assert given.directions == (word,)
-    assert given.sliding_friction == 0.2
+    scan = import_table({**SLID, "t (s)": np.arange(7.0)}, **MOVED, sliding=word)
+    np.testing.assert_allclose(scan.x, 2e-3 * sign * np.arange(7.0), atol=1e-12)
+    given = Scan.from_arrays(scan.x, scan.u_zz, sliding=word, speed=1e-3, tangential_load=0.2)
+    assert given.directions == scan.directions == (word,)
+    assert (given.kind, given.speed) == ("line", 1e-3)
 
 
 @pytest.mark.parametrize(("way", "words"), [(0, "directions of sliding"), ("up", "forth or back")])
 def test_what_is_no_direction_is_refused(way, words):
     with pytest.raises(InputError, match=words):
-        import_table({**SLID, "way": [way] * 7}, u="U", x="x", sliding="way")
+        import_table({**SLID, "t (s)": np.arange(7.0), "way": [way] * 7}, **MOVED, sliding="way")

@@ -78,9 +78,7 @@ def test_a_scan_that_contradicts_itself_is_refused(kind, changes, problem):
         ({"low_pass": 3.0, "low_pass_uncertainty": -0.1}, "low_pass_uncertainty of the sensor"),
         ({"low_pass_uncertainty": 0.1}, "low_pass_uncertainty, but no low_pass"),
         ({"quality": 2.0}, "quality, but no resonance"),
-        ({"resonance": 90.0}, "resonance, but no quality"),
         ({"creep_share": 0.05}, "creep_share, but no creep_time"),
-        ({"creep_record": 60.0}, "creep_record, but no creep_share"),
         ({"creep_share": 1.0, "creep_time": 1.0}, "creep_share of the sensor is 1"),
     ],
 )
@@ -91,21 +89,16 @@ def test_dynamics_that_are_not_whole_are_refused(stated, problem):
 
 @pytest.mark.parametrize("kind", ["repeats", "points"])
 def test_passes_of_one_direction_are_told_from_those_of_the_other(kind):
-    scan = make_scan(kind)
-    rows = np.where(scan.passes % 2, -1.0, 1.0)
-    if np.ptp(rows) == 0:
-        rows[-9:] = -1.0
-        scan = replace(scan, repeat=np.where(rows > 0, 1, 2))
-    scan = replace(scan, motion="sliding", sliding_direction=rows)
-    assert scan.directions == ("forth", "back")
-    both = [scan.only_direction(word) for word in scan.directions]
-    assert [part.directions for part in both] == [("forth",), ("back",)]
-    assert sum(part.u_zz.size for part in both) == scan.u_zz.size
-    assert np.array_equal(both[1].u_zz.ravel(), scan.u_zz[rows < 0], equal_nan=True)
+    forth = make_scan(kind).passes % 2 == 0
+    scan = make_scan(kind, motion="sliding", sliding_direction=np.where(forth, 1, -1))
+    for word, own in (("forth", forth), ("back", ~forth)):
+        part = scan.only_direction(word)
+        assert part.directions == (word,)
+        assert np.array_equal(part.u_zz.ravel(), scan.u_zz[own], equal_nan=True)
 
 
 def test_a_pass_of_both_directions_is_refused():
-    scan = make_scan(motion="sliding", sliding_direction=np.where(np.arange(33) < 9, 1, -1))
+    scan = make_scan(motion="sliding", sliding_direction=[1, -1, 1] * 11)
     with pytest.raises(InputError, match="holds both directions"):
         scan.only_direction("forth")
 
