@@ -24,6 +24,7 @@ from memscal.estimation.gaussian import fit_gaussian_to_points
 from memscal.estimation.points import TANGENTIAL, ScanPoints, measured_mask, measured_points
 from memscal.estimation.profile import NUMERICAL_FLOOR, ProfileEstimate, stated_weights
 from memscal.estimation.voltage_map import square_root
+from memscal.extensions import hook
 from memscal.measurement.posterior import columns_of, film_transfer, sensor_changes, shared_changes
 from memscal.measurement.restoration import Restoration
 from memscal.measurement.restore import gaussian_pressure, load_of, undetermined, unit_force
@@ -319,7 +320,7 @@ def measured_scan(scan: Scan) -> MeasuredScan:
         width=_width(scan),
         lubrication=scan.lubrication,
         motion=scan.motion,
-        speed=scan.speed,
+        speed=_speed(scan),
         sliding_friction=scan.sliding_friction,
         sliding_friction_uncertainty=scan.sliding_friction_uncertainty,
         position_scale_uncertainty=scan.position_scale_uncertainty,
@@ -329,6 +330,13 @@ def measured_scan(scan: Scan) -> MeasuredScan:
         source=scan.source,
         unit="" if scan.unit == "V" else scan.unit,
     )
+
+
+def _speed(scan: Scan) -> float | None:
+    """Speed of an indenter, in m/s: as stated, or of one that slid by the times, to two digits."""
+    if scan.speed or scan.time is None or scan.motion != "sliding":
+        return scan.speed
+    return float(f"{np.median(np.abs(hook('velocities')(scan))):.2g}")
 
 
 def measured_profile(

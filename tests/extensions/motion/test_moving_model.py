@@ -19,6 +19,7 @@ from memscal.estimation.reference_spectra import reference_spectra
 from memscal.extensions.motion.moving_model import changes_by_dynamics
 from memscal.extensions.motion.transfer import transfer
 from memscal.extensions.motion.velocities import velocities
+from memscal.measurement.measured_profile import measured_scan
 
 FILM = memscal.ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
 ROD = memscal.Rod(radius=0.25e-3)
@@ -250,3 +251,11 @@ def test_dynamics_without_a_velocity_are_told_not_to_count():
 
     assert "dynamics_unused" in kinds(rod_scan())
     assert "dynamics_unused" not in kinds(rod_scan(speed=SPEED))
+
+
+def test_the_speed_of_an_indenter_that_slid_is_that_of_its_times():
+    time = np.stack([X, X[::-1]]) / 2.004e-3
+    u = np.tile(np.exp(-((X / 1e-3) ** 2)), (2, 1))
+    slid = scan_of(None, u=u, time=time, motion="sliding", sliding_direction=np.array([1, -1]))
+    assert measured_scan(slid).speed == pytest.approx(2e-3, rel=1e-9)
+    assert measured_scan(scan_of(None, time=X / 2e-3)).speed is None
