@@ -37,6 +37,7 @@ class CalibrationOptions(TypedDict, total=False):
     correlations: Correlations | None
     pixel_size: float | None
     free: Literal["thickness"] | Sequence[Literal["thickness"]]
+    creep: Any
     seed: int
     override: bool
     accept_altered: bool

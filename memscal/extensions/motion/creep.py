@@ -143,10 +143,10 @@ def creep_of(record: Scan) -> Creep:
         spread = np.std(np.exp(-time / short)) * u.size**0.5
         seen = (least**0.5 + _MOSTLY) * np.std(u) / spread / abs(u.mean())
         raise FitError(
-            f"{place_of(record)}: no creep seen of a time within the record; a share of "
-            f"{100 * seen:.2g} % with a time of {short:.2g} s or longer would have been seen.",
-            why="Readings that do not creep need no correction.",
-            cure="If they do, begin the record at the contact; record faster, or for longer.",
+            f"{place_of(record)}: no creep seen; a share of {100 * seen:.2g} % with a time of "
+            f"{short:.2g} s or longer would have been seen.",
+            why="It was sought with times from that between readings to that of the whole record.",
+            cure="Calibrate without it; or begin the record at the contact, and record for longer.",
         )
     found, covariance = curve_fit(dwell_readings, time, u, (0.1, tau, u[-1]))
     left = u - dwell_readings(time, *found)

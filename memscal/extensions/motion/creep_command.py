@@ -45,10 +45,10 @@ def command(record: Path, output: Path, **options: Any) -> int:
     from memscal.formats.scan import read_scan
     from memscal.formats.tables.scan import import_table, records_of
 
-    names = ("time", "u", "time_unit", "u_unit")
-    columns = {"motion": "rest", **stated_options(options, names)}
+    given = stated_options(options, ("time", "u", "time_unit", "u_unit"))
+    columns = {"motion": "rest", **given}
     records = records_of(columns)
-    dwell = import_table(record, **records, **columns) if options["u"] else read_scan(record)
+    dwell = import_table(record, **records, **columns) if given else read_scan(record)
     creep = creep_of(dwell)
     out.deliver(creep, output, partial(write_creep, creep), options, "creep")
     return exit_code_of(creep.checks, then=f" {output.name} was written and is marked so.")
