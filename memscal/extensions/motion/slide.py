@@ -24,7 +24,7 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
-import scipy.fft
+from scipy.fft import fftfreq, irfft2, next_fast_len, rfft2, rfftfreq
 from scipy.sparse.linalg import LinearOperator, gmres
 
 from memscal.errors import ConvergenceError, DomainError, InputError
@@ -41,10 +41,8 @@ _CELLS = (32, 64, 128, 256, 512)
 _CHANGE = 5e-4
 #: A smaller contact, in thicknesses, is that of a half-space.
 _LEAST_RADIUS = 0.05
-#: The window is so much wider than the contact from which it starts; the first one is so many
-#: radii of the contact without friction, to either side.
+#: The window is so much wider than the contact from which it starts, or that it cuts off.
 _MARGIN = 1.1
-_FIRST_WINDOW = 2.0
 #: Sets of cells in contact that are tried, tolerance in depths, and vectors that GMRES keeps.
 _SETS = 60
 _TOLERANCE = 1e-6
@@ -124,22 +122,20 @@ def slide(
     if radius < _LEAST_RADIUS * film.thickness:
         raise DomainError(
             f"The contact has a radius of {radius * 1e6:.3g} um on a film of "
-            f"{film.thickness * 1e6:.4g} um.",
-            why="To such a contact the film is a half-space: at its base there is a point force.",
+            f"{film.thickness * 1e6:.4g} um, which is a half-space to it.",
             cure="Give more load, or a thinner film.",
         )
     solve = partial(solve_sliding, film, indenter, load, direction * friction)
-    window = _FIRST_WINDOW * radius
-    contact = solve(Region(-window, window, window))
+    contact = solve(Region(-radius, radius, radius), (points or _CELLS[0]) // 2)
     for cells in [points] if points else _CELLS:
         finer = solve(contact.region, cells)
         change = abs(finer.base_stress(finer.x) - contact.base_stress(finer.x)).max()
-        contact = replace(finer, convergence=float(change / finer.max_base_stress))
+        contact = replace(finer, convergence=change / finer.max_base_stress)
         if contact.convergence < _CHANGE:
             break
     if np.abs(contact.region).max() > indenter.extent:
         raise DomainError(
-            f"Under {load:g} N the contact outgrows the {indenter.shape}'s known face, of a "
+            f"Under {load:g} N the film reaches beyond the {indenter.shape}'s known face, of a "
             f"radius of {indenter.extent * 1e3:.4g} mm.",
             cure="Give the face farther out, or less load.",
         )
@@ -159,71 +155,72 @@ def solve_sliding(
     ``friction`` is the shear along x over the pressure, of either sign; ``start`` the region of a
     contact like it: the window is wider by a tenth.
     """
-    # Lengths are in thicknesses here, stresses in Young's modulus.
     h = film.thickness
-    low, high, half_width = np.array(start) / h
+    low, high, half_width = start
     step = _MARGIN / cells * max(high - low, 2 * half_width)
-    y = step * (np.arange(cells) - (cells - 1) / 2)
+    y = step * np.arange((1 - cells) / 2, cells / 2)
     x = y + (low + high) / 2
-    heights = indenter.height(h * np.hypot.outer(y, x)) / h
-    total = load / (film.young_modulus * h**2 * step**2)
-    influence = _influence(step, cells, film.poisson_ratio, friction)
+    # Beyond what is known of it the face is level: what gets there is refused.
+    heights = indenter.height(np.minimum(np.hypot.outer(y, x), indenter.extent))
+    influence = _influence(step / h, cells, film.poisson_ratio, friction)
+    # Pressures times h/E, which is a length.
+    total = load * h / (film.young_modulus * step**2)
     pressure, depth = _balanced(heights, influence, total)
-    return SlidingContact(
+    solved = SlidingContact(
         film=film,
         indenter=indenter,
         load=load,
         friction=friction,
-        x=h * x,
-        y=h * y,
-        pressure=film.young_modulus * pressure,
-        depth=h * depth,
+        x=x,
+        y=y,
+        pressure=film.young_modulus / h * pressure,
+        depth=depth,
     )
+    if np.any(pressure != np.pad(pressure[1:-1, 1:-1], 1)):
+        # The window cuts off a part of the contact.
+        wider = Region(*np.multiply(_MARGIN, start))
+        return solve_sliding(film, indenter, load, friction, wider, cells)
+    return solved
 
 
 def _balanced(heights: FloatArray, influence: FloatArray, total: float) -> tuple[FloatArray, float]:
     """Return pressures of a total on the cells of a window that an indenter touches, and depth."""
     cells = len(heights)
     padded = influence.shape
-    waves = scipy.fft.rfft2(influence)
-    inside = np.isfinite(heights)
-    pressure = np.zeros_like(heights)
-    unknown = np.zeros(1)  # the depth, and pressures on the cells inside of the contact
+    waves = rfft2(influence)
+    inside = heights >= 0  # all cells
 
     def pressed(unknown: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return pressures, and how far they depress the film below the depth."""
+        """Return pressures by depth and those inside, and how far they depress the film below."""
         pressure = np.zeros_like(heights)
         pressure[inside] = unknown[1:]
-        depressed = scipy.fft.irfft2(waves * scipy.fft.rfft2(pressure, padded), padded)
+        depressed = irfft2(waves * rfft2(pressure, padded), padded)
         return pressure, depressed[:cells, :cells] - unknown[0]
 
     def balance(unknown: FloatArray) -> FloatArray:
         return np.append(unknown[1:].mean(), pressed(unknown)[1][inside])
 
     for _ in range(_SETS):
-        guess = np.append(unknown[0], pressure[inside])
-        operator = LinearOperator((guess.size, guess.size), balance, dtype=guess.dtype)
         sides = np.append(total / inside.sum(), -heights[inside])
-        unknown, _ = gmres(operator, sides, guess, rtol=_TOLERANCE / 10, restart=_KEPT)
+        operator = LinearOperator((sides.size, sides.size), balance)
+        unknown, _ = gmres(operator, sides, rtol=_TOLERANCE / 10, restart=_KEPT)
         pressure, depressed = pressed(unknown)
         passing = depressed + heights < -_TOLERANCE * unknown[0]
         lying = np.where(inside, pressure > 0, passing)
-        # A contact at the rim of the window never settles.
-        if np.array_equal(lying, np.pad(inside[1:-1, 1:-1], 1)):
-            return pressure, float(unknown[0])
+        if np.array_equal(lying, inside):
+            return pressure, unknown[0]
         inside = lying
     raise ConvergenceError(
         "The sliding contact did not settle.",
-        why="It may reach beyond the window in which it is sought.",
         cure="Give more points, or less friction.",
     )
 
 
 def _influence(step: float, cells: int, poisson_ratio: float, friction: float) -> FloatArray:
     """Depression by a pressure on the first cell and its shear, at lags up to ``cells``."""
-    count = scipy.fft.next_fast_len(2 * cells + int(_BETWEEN_IMAGES / step), real=True)
-    along_x = scipy.fft.rfftfreq(count, step)
-    along_y = scipy.fft.fftfreq(count, step)
+    count = next_fast_len(2 * cells + int(_BETWEEN_IMAGES / step))
+    along_x = rfftfreq(count, step)
+    along_y = fftfreq(count, step)
     frequency = np.hypot.outer(along_y, along_x)
     frequency[0, 0] = _SMALLEST
     normal, coupling, _ = corrections(2 * np.pi * frequency, poisson_ratio)
@@ -231,4 +228,4 @@ def _influence(step: float, cells: int, poisson_ratio: float, friction: float) -
     # (1 - nu)/G in units of 1/E.
     spectrum = (1 - poisson_ratio**2) / np.pi / frequency * (1 + normal + 1j * by_shear)
     lags = np.r_[0:cells, -cells:0]
-    return floats(scipy.fft.irfft2(spectrum, (count, count))[np.ix_(lags, lags)])
+    return floats(irfft2(spectrum, (count, count))[np.ix_(lags, lags)])

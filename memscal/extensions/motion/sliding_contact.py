@@ -8,7 +8,6 @@ With :math:`q = \mu p` along x the stress at the base is, in the film's transfer
     \hat\sigma_{zz} = (T - i\mu\cos\varphi\,N)\,\hat p.
 """
 
-import math
 from functools import cached_property
 from typing import NamedTuple
 
@@ -85,7 +84,7 @@ class SlidingContact(Shown):
     y: FloatArray
     pressure: FloatArray
     depth: float
-    convergence: float = math.nan
+    convergence: float = np.nan
 
     def __repr__(self) -> str:
         """Return what slides, load, friction and depth in place of the pressures."""
@@ -108,11 +107,12 @@ class SlidingContact(Shown):
 
     def interface_pressure(self, x: ArrayLike, y: ArrayLike) -> FloatArray:
         """Return the pressure in Pa at places in m, which are broadcast; zero outside."""
-        from scipy.interpolate import RegularGridInterpolator
+        from scipy.interpolate import interpn
 
-        cells = (self.y, self.x)
-        linear = RegularGridInterpolator(cells, self.pressure, bounds_error=False, fill_value=0.0)
-        return floats(linear(np.stack(np.broadcast_arrays(y, x), axis=-1)))
+        places = (floats(y), floats(x))
+        return floats(
+            interpn((self.y, self.x), self.pressure, places, bounds_error=False, fill_value=0.0)
+        )
 
     def base_stress(self, x: ArrayLike, y: ArrayLike = 0.0) -> FloatArray:
         """Return the normal stress at the base in Pa at places in m, which are broadcast.
@@ -135,18 +135,18 @@ class SlidingContact(Shown):
         :math:`\int\sigma_{zz}\,e^{-i(k_x x + k_y y)}\,dx\,dy` at wavenumbers in rad/m, which are
         broadcast: the load where both are zero.
         """
-        k = np.hypot(kx, ky)
-        by_pressure, by_shear = base_response(k * self.film.thickness, self.film.poisson_ratio)
-        shear = self.friction * np.divide(kx, np.where(k > 0, k, 1.0))
+        kh = np.hypot(kx, ky) * self.film.thickness
+        by_pressure, by_shear = base_response(kh, self.film.poisson_ratio)
+        shear = self.friction * np.cos(np.arctan2(ky, kx))
         rows = np.exp(1j * np.multiply.outer(ky, self.y)) @ self.pressure
         pressed = np.vecdot(np.exp(1j * np.multiply.outer(kx, self.x)), rows)
-        cell = (self.y[1] - self.y[0]) ** 2
-        return np.asarray(cell * (by_pressure - 1j * shear * by_shear) * pressed)
+        cell = self.load / self.pressure.sum()
+        return np.asarray(cell * pressed * (by_pressure - 1j * shear * by_shear))
 
     @property
     def surface_centroid(self) -> float:
         """Centroid of the pressure along x, in m."""
-        return float((self.pressure @ self.x).sum() / self.pressure.sum())
+        return np.average(self.x, weights=self.pressure.sum(axis=0))
 
     @property
     def base_centroid(self) -> float:
@@ -155,15 +155,10 @@ class SlidingContact(Shown):
         return float(-np.angle(self.base_spectrum(k, 0.0)) / k)
 
     @cached_property
-    def peak_position(self) -> float:
-        """Where along x the normal stress at the base is largest, in m."""
-        x = np.linspace(self.x[0], self.x[-1], _SAMPLES)
-        return float(x[self.base_stress(x).argmax()])
-
-    @property
     def max_base_stress(self) -> float:
         """Largest normal stress at the base, in Pa."""
-        return float(self.base_stress(self.peak_position))
+        x = np.linspace(self.x[0], self.x[-1], _SAMPLES)
+        return float(self.base_stress(x).max())
 
 
 def _end(places: FloatArray, pressure: FloatArray) -> float:

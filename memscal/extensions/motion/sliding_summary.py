@@ -5,7 +5,7 @@ from pathlib import Path
 
 from memscal.extensions.motion.sliding_contact import SlidingContact
 from memscal.model.arrays import Values
-from memscal.model.quantities import MM, Quantity
+from memscal.model.quantities import Quantity
 from memscal.summaries.declared import members
 from memscal.summaries.table import Table
 
@@ -20,9 +20,6 @@ def mapping(contact: SlidingContact) -> Values:
 
 def tables(contact: SlidingContact) -> list[Table]:
     """Return a row for each number."""
-    values = mapping(contact).values()
-    texts = [f"{number['value']:.4g} {number['unit']}".removesuffix(" 1") for number in values]
-    rows = list(zip((quantity.words for quantity in _QUANTITIES), texts, strict=True))
-    thickness = contact.film.thickness / MM
-    title = f"A {contact.indenter.shape} that slides on a film of {thickness:.4g} mm"
-    return [Table(title, ("", ""), rows)]
+    numbers = zip(_QUANTITIES, mapping(contact).values(), strict=True)
+    rows = [(quantity.heading, f"{number['value']:.4g}") for quantity, number in numbers]
+    return [Table(f"A {contact.indenter.shape} that slides on a film", ("", ""), rows)]
