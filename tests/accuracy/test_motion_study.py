@@ -328,7 +328,7 @@ def test_the_creep_of_a_dwell_record_corrects_a_calibration(speed, wrong, seed):
         return np.array([apparatus.conversion_constant, apparatus.gaussian_sigma])
 
     true = found(Dynamics())
-    # The noise of the record leaves 0.09 % of A and 0.06 % of sigma.
+    # Within 0.2 and 0.4 %, and four times the 0.09 and 0.06 % that the record's noise leaves.
     corrected = found(CREEP, creep=creep_of(record)) / true
-    assert (np.abs(corrected - 1) < [0.002 + 0.0035, 0.004 + 0.0025]).all()
+    assert (np.abs(corrected - 1) < [0.0055, 0.0065]).all()
     assert found(CREEP) / true - 1 == pytest.approx(wrong, abs=0.005)
