@@ -12,9 +12,9 @@ def answer(creep: Creep) -> str:
     found = creep.parameters
     return (
         f"A share of {measured_text(found, 'share')} of a reading comes late, with a time of "
-        f"{measured_text(found, 'time')}.\nA calibration with it holds {found['record']:.4g} s "
-        f"after a contact, where the record ends: what creeps later is not seen.\n"
-        f"{verdict(creep.checks)}"
+        f"{measured_text(found, 'time')}.\n{verdict(creep.checks)}\n"
+        f"A calibration with it holds {found['record']:.4g} s after a contact, where the record "
+        "ends: what creeps later is not seen."
     )
 
 
