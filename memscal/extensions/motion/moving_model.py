@@ -27,8 +27,11 @@ from memscal.model.instrument import Dynamics
 
 #: Points of a grid for each half wave of the last wavenumber.
 _OVERSAMPLING = 1.25
-#: A grid reaches this share of a line's length beyond both of its ends.
+#: A grid reaches this share of a line's length beyond both of its ends, and so many steps at least.
 _BEYOND = 0.5
+_LEAST = 60
+#: Points of a mean, where a line has so few readings that they are fewer than those of its grid.
+_NODES = 8
 #: A period is at most so many times longer: what is left of its other end is then a straight line.
 _LONGEST = 16
 
@@ -153,9 +156,13 @@ def _weights(
     """Return the even grid (m,) of a line, and what each reading takes of it, (n, m)."""
     positions = np.frombuffer(along)
     speed = np.frombuffer(velocity)
-    reach = _BEYOND * np.ptp(positions)
     step = np.pi / (_OVERSAMPLING * last)
+    reach = max(_BEYOND * np.ptp(positions), _LEAST * step)
     count = int(np.ceil((np.ptp(positions) + 2 * reach) / step)) + 1
+    if not speed.any() and _NODES * positions.size < count + _NODES:
+        nodes, shares = np.polynomial.legendre.leggauss(_NODES)
+        means = np.kron(np.eye(positions.size), shares / 2)
+        return np.add.outer(positions, averaging / 2 * nodes).ravel(), means
     x = positions.min() - reach + step * np.arange(count)
     # Waves of a period that is so much longer that nothing of its other end is left.
     settling = settling_time(dynamics) * abs(speed).max() if dynamics else 0.0

@@ -119,6 +119,16 @@ def test_a_mean_along_the_scan_is_the_mean_of_the_still_signal():
     assert signal == pytest.approx((upper - lower) / 0.8e-3, abs=1e-4 * ends.max())
 
 
+def test_means_at_single_places_of_a_plane_are_those_of_the_still_signal():
+    x, y = np.random.default_rng(3).uniform(-4e-3, 4e-3, (2, 30))
+    means = scan_of(None, u=np.exp(-np.hypot(x, y) / 1e-3), x=x, y=y, averaging_length=0.8e-3)
+    signal = model_signal(means)[3]
+    ways = np.linspace(-0.4e-3, 0.4e-3, 81)
+    still = blurred_stress()(np.hypot(np.add.outer(x - CENTRE, ways), y[:, None]))
+    expected = np.trapezoid(still, ways, axis=1) / 0.8e-3
+    assert signal == pytest.approx(expected, abs=1e-4 * still.max())
+
+
 def test_the_slopes_are_those_of_moved_centres():
     scan = scan_of(DYNAMICS["low_pass"], speed=SPEED)
     model, geometry, kernel, _ = model_signal(scan)
