@@ -161,8 +161,8 @@ def _weights(
     count = int(np.ceil((np.ptp(positions) + 2 * reach) / step)) + 1
     if not speed.any() and _NODES * positions.size < count + _NODES:
         nodes, shares = np.polynomial.legendre.leggauss(_NODES)
-        means = np.kron(np.eye(positions.size), shares / 2)
-        return np.add.outer(positions, averaging / 2 * nodes).ravel(), means
+        x = np.add.outer(positions, averaging / 2 * nodes).ravel()
+        return floats(x), floats(np.kron(np.eye(positions.size), shares / 2))
     x = positions.min() - reach + step * np.arange(count)
     # Waves of a period that is so much longer that nothing of its other end is left.
     settling = settling_time(dynamics) * abs(speed).max() if dynamics else 0.0
