@@ -70,6 +70,7 @@ Examples:
   memscal compare sensor.apparatus.h5 dry.h5 --friction 0.1 --friction 0.2 --json
   memscal compare sensor.apparatus.h5 dry.h5 --loading incremental --interface --macroscopic 1.6
   memscal compare sensor.apparatus.h5 dry.h5 --reference fem0.h5 --reference fem03.h5
+  memscal compare sensor.apparatus.h5 sliding.h5 --sliding --backlash 5
   memscal compare shear.apparatus.h5 dry.stress.h5 --channel xz
   memscal compare sensor.apparatus.h5 dry.stress.h5 --shear shear.apparatus.h5
 """
@@ -119,6 +120,13 @@ Examples:
 @option("--interface", is_flag=True)(
     "Also explain the profiles by an interface that yields before it slips, at the "
     "macroscopic friction, and report which of the two explanations is more likely."
+)
+@option("--sliding", is_flag=True)(
+    "Compare scans of a sphere that slid (/entry/indenter/motion) with contacts that slide."
+)
+@option("--backlash", NonNegative("um"))(
+    "Standard uncertainty of the difference of positions between sliding forth and back, which "
+    "have one centre then.  [default: each has its own]"
 )
 @contact_options
 @option("--cache", FILE, metavar="FOLDER")(
@@ -224,6 +232,8 @@ def _named_figures(options: Options, lubrications: Iterable[str]) -> dict[str, P
     if folder.exists() and not folder.is_dir():
         raise click.UsageError(f"--figures names a folder, but {folder} is a file.")
     stems = figure_stems(lubrications, interface=options["interface"])
+    if options["sliding"]:
+        stems = ["sliding"]
     return {stem: folder / f"{stem}.{options['figure_format']}" for stem in stems}
 
 
@@ -246,6 +256,8 @@ _SETTINGS = (
     "macroscopic_uncertainty",
     "interface",
     "shear",
+    "sliding",
+    "backlash",
     "override",
     "accept_altered",
 )
@@ -256,6 +268,7 @@ _NORMAL_STRESS_ONLY = {
     "shear": "shear",
     "macroscopic": "macroscopic",
     "interface": "interface",
+    "sliding": "sliding",
     "figures": "figure",
     "folder": "figures",
 }

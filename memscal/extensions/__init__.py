@@ -65,6 +65,10 @@ VIEWS = {
     "FrictionComparison": ("summaries.comparison", "figures.friction.comparison_figure"),
     "Holds": ("", "figures.holds.holds_figure"),
     "MeasuredStress": ("summaries.stress", "figures.stress.measured_stress_figure"),
+    "SlidingComparison": (
+        "extensions.motion.friction_summary",
+        "extensions.motion.friction_figure.friction_figure",
+    ),
     "Restoration": ("summaries.restoration", "figures.stress.restoration_figure"),
     "ArrayCalibration": (
         "extensions.arrays.summary",
@@ -115,6 +119,7 @@ HOOKS = {
     "write_artifact": "formats.artifact",
     "write_stress": "formats.stress",
     "compare_interface": "extensions.interface_laws.model_comparison",
+    "compare_sliding": "extensions.motion.compare_sliding",
     "count_presses": "extensions.recorded.presses",
     "import_tables": "extensions.fleet.import_tables",
     "interface_figure": "extensions.interface_laws.figure",

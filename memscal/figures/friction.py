@@ -175,7 +175,8 @@ def comparison_figures(comparison: FrictionComparison) -> Mapping[str, Callable[
     """Return what draws each figure of a comparison when called, by the stem of its file's name."""
     figures: dict[str, Callable[[], Figure]] = {}
     if comparison.by_shear:
-        return figures
+        # Of a shear alone there is none.
+        return figures if comparison.shear else {"sliding": comparison.plot}
     for state in dict.fromkeys(profile.lubrication for profile in comparison.measured.profiles):
         tail = f"-{state}" if state else ""
         figures[f"profiles{tail}"] = partial(profile_figure, comparison, state)

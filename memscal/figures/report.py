@@ -257,6 +257,7 @@ _COMPARED = {
     "the whole profile, with 95 % intervals; band: all loads together",
     "likelihood": "Likelihood of each friction coefficient: twice the loss of its logarithm, for "
     "each load and for all together; dotted: what bounds 68 % and 95 %",
+    "sliding": "Measured beside calculated profiles of sliding, and the friction coefficient",
     "interface": "Laws of the interface: how well each length explains all loads, the evidence of "
     "each law, and the friction coefficients that a slip length means",
 }

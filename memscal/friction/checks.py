@@ -45,7 +45,7 @@ def comparison_checks(
         )
         readings = (load.by_profile for load in by_loading)
         if noise_stated:
-            checks.append(_reduced(f"profile_chi_square_{i}", readings, explained))
+            checks.append(reduced_check(f"profile_chi_square_{i}", readings, explained))
         checks.append(check(f"bracketing_{i}", outside, _OUTSIDE, bracketed))
     if noise_stated:
         for lubrication, estimates in joint.items():
@@ -56,14 +56,14 @@ def comparison_checks(
                 "while the single loads pass means that friction changes with the load: look at "
                 "the coefficient of each load, or at laws of the interface."
             )
-            checks.append(_reduced(name, estimates.values(), together))
+            checks.append(reduced_check(name, estimates.values(), together))
     if "lubricated" in joint:
         dry = [each for state, each in joint.items() if state != "lubricated"]
         checks.append(frictionless_check(joint["lubricated"], dry))
     return tuple(checks)
 
 
-def _reduced(name: str, estimates: Iterable[BoundedEstimate], meaning: str) -> QualityCheck:
+def reduced_check(name: str, estimates: Iterable[BoundedEstimate], meaning: str) -> QualityCheck:
     """Return the check of the reduced chi-square of the best of some estimates."""
     best = min(estimates, key=lambda estimate: estimate.least)
     limit = chi_square_limit(best.degrees) / best.degrees

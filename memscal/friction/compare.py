@@ -45,7 +45,7 @@ from memscal.model.checks import Message, override_messages
 from memscal.model.indenter import Sphere
 from memscal.model.measured_stress import MeasuredScan, MeasuredStress
 from memscal.model.provenance import accepted_alterations
-from memscal.model.scan import Scan, require_pressed
+from memscal.model.scan import Scan, require_pressed, require_sliding
 from memscal.model.sizes import MOST_COMPARED, MOST_COMPARED_TOGETHER, too_large
 from memscal.model.stress import StressProfile
 from memscal.parallel import single_threaded
@@ -60,7 +60,7 @@ def scans_of(contacts: Sequence[Scan | MeasuredStress]) -> list[Scan | MeasuredS
     return scans
 
 
-def require_contacts(scans: Sequence[Scan | MeasuredScan]) -> None:
+def require_contacts(scans: Sequence[Scan | MeasuredScan], *, sliding: bool = False) -> None:
     """Refuse what is no scan of a sphere's contacts, or not all on one film with one sphere."""
     for scan in scans:
         place = scan.source.file_name if scan.source else "The scan"
@@ -74,7 +74,8 @@ def require_contacts(scans: Sequence[Scan | MeasuredScan]) -> None:
                 "grow: a rod scan calibrates a sensor.",
                 cure="Give the scans of a sphere's contacts; calibrate with the rod scan.",
             )
-        require_pressed(scan.motion, scan.source)
+        require_motion = require_sliding if sliding else require_pressed
+        require_motion(scan.motion, scan.source)
         if isinstance(scan, Scan) and scan.y is not None:
             require_line(place, scan.x, scan.y)
         if (scan.film, scan.indenter) != (scans[0].film, scans[0].indenter):
@@ -141,6 +142,8 @@ def compare(
     macroscopic: float | None = None,
     macroscopic_uncertainty: float | None = None,
     interface: bool = False,
+    sliding: bool = False,
+    backlash: float | None = None,
     noise_record: Scan | FilePath | None = None,
     override: bool = False,
     accept_altered: bool = False,
@@ -193,6 +196,13 @@ def compare(
     interface : bool
         Whether to weigh laws of the interface against effective friction, at the macroscopic
         coefficient.
+    sliding : bool
+        Compare the scans of an indenter that slid with a contact that slides, with a shear of the
+        coefficient times the pressure everywhere: :func:`memscal.slide`.  ``friction`` to
+        ``interface`` but ``between_scan_gain`` are of no use then.
+    backlash : float, optional
+        Standard uncertainty of the difference of positions between sliding forth and back, in m:
+        both have one centre then.  By default each direction has a centre of its own.
     noise_record : Scan or path, optional
         Readings of the sensor at rest (``memscal import --noise-record``), whose noise, in size and
         correlation, the scans' readings have at their times, in place of a stated one.
@@ -250,16 +260,30 @@ def compare(
     require_non_negative("friction of lubricated loads", lubricated_friction)
     require_non_negative("gain between scans", between_scan_gain)
     beside = {None: lubricated_friction, FRICTIONLESS: 0.0, APART: None}[lubricated]
-    require_contacts(scans_of(opened))
+    require_contacts(scans_of(opened), sliding=sliding)
+    require_non_negative("backlash", backlash)
+    if backlash is not None and not sliding:
+        raise InputError(
+            "A backlash is given, but no sliding scan is to be compared.",
+            cure="Leave it out, or give sliding (--sliding).",
+        )
     _require_few(opened, [one.sensor.channel for one in (sensor, tangential) if one])
     measured = _measured(opened, sensor, override)
     setting = _setting(measured, cache, workers)
-    if sensor.order:
-        if any(option is not None for option in (references, lubricated, shear, macroscopic)):
+    if sensor.order or sliding:
+        others = (references, lubricated, shear, macroscopic, friction if sliding else None)
+        if any(option is not None for option in others):
             raise InputError(
-                "The artifact is of a tangential channel, with options of the normal one.",
-                cure="Leave out references, lubricated, shear and macroscopic, or give that of zz.",
+                "A tangential channel, or sliding, is compared with options of the normal one.",
+                cure="Leave out references, lubricated, shear and macroscopic (for sliding, "
+                "friction, too), or give the artifact of zz and scans of contacts at rest.",
             )
+    if sliding:
+        slid: FrictionComparison = hook("compare_sliding")(
+            measured, sensor, setting, between_scan_gain, backlash
+        )
+        return slid
+    if sensor.order:
         return _compared_by_shear(measured, sensor, setting, friction, loading, override)
     if tangential and references is not None:
         raise InputError(
@@ -275,7 +299,7 @@ def compare(
         shear_families = _families(setting, friction, loading, order=1)
 
     # Fit and check.
-    sliding = None if macroscopic is None else (macroscopic, macroscopic_uncertainty)
+    known = None if macroscopic is None else (macroscopic, macroscopic_uncertainty)
     comparison = compare_measured(
         measured,
         sensor,
@@ -284,7 +308,7 @@ def compare(
         between_scan_gain=between_scan_gain,
         shear=tangential,
         shear_families=shear_families,
-        macroscopic=sliding,
+        macroscopic=known,
     )
     if comparison.unexplained and references is None and not tangential:
         first, *_ = channels_of(measured, sensor, families, (), between_scan_gain).values()

@@ -21,7 +21,6 @@ from numpy.typing import ArrayLike
 from memscal.axisymmetry.hankel import Wavenumbers
 from memscal.errors import ConvergenceError, DomainError, InputError
 from memscal.formats.cache import CacheFolder, find_contact_table, keep_contact_table, table_key
-from memscal.mechanics.contact import Contact
 from memscal.mechanics.indent import Loading, indent
 from memscal.mechanics.interface import Interface
 from memscal.model.arrays import (
@@ -85,6 +84,7 @@ class ProfileFamily(FrozenArrays):
     notes: tuple[str, ...] = ()  # what was assumed
     order: int = 0  # one of the shear
     slopes: FloatArray | None = None  # of a selection by at(), whose values have any order
+    interpolation: str = "PchipInterpolator"  # of scipy.interpolate
 
     @cached_property
     def coordinates(self) -> FloatArray:
@@ -142,12 +142,12 @@ class ProfileFamily(FrozenArrays):
     @cached_property
     def _interpolant(self) -> Any:
         """Interpolant of spectra, derivatives and changes, shape (2 + sources, L, K)."""
-        from scipy.interpolate import PchipInterpolator, PPoly
+        from scipy import interpolate
 
         stack = np.stack([self.spectra, self.by_load, *self.changes.values()], axis=1)
         if self.values.size == 1:  # a constant
-            return PPoly(stack[None], [0.0, 1.0])
-        return PchipInterpolator(self.coordinates, stack)
+            return interpolate.PPoly(stack[None], [0.0, 1.0])
+        return getattr(interpolate, self.interpolation)(self.coordinates, stack)
 
 
 #: Smaller steps of Poisson's ratio would show the rings' placing beside the change.
@@ -181,6 +181,34 @@ class LoadingPath:
     derivatives: bool = True
     order: int = 0  # one for the shear at the base
 
+    def contacts(self, loads: FloatArray) -> Sequence[Any]:
+        """Solve the contacts at increasing loads (N)."""
+        usual = _RINGS_OF_A_RIGID_CONTACT if self.interface.rigid else _RINGS_OF_A_COMPLIANT_CONTACT
+        for rings in (usual, *_OTHER_RINGS):
+            try:
+                return indent(
+                    self.film,
+                    self.indenter,
+                    load=loads,
+                    friction=self.friction,
+                    # Without friction the way makes no difference, and the solution is remembered.
+                    loading=self.loading if self.friction > 0 else "incremental",
+                    interface=self.interface,
+                    strain="linear",
+                    rings=rings,
+                )
+            except (ConvergenceError, DomainError) as error:
+                failure = error
+                if isinstance(error, DomainError):
+                    break
+        raise type(failure)(
+            f"The contact of a sphere of radius {self.indenter.radius * 1e3:.4g} mm with a film of "
+            f"{self.film.thickness * 1e3:.4g} mm cannot be calculated up to {max(self.loads):g} N "
+            f"(friction {self.friction:g}, {self.loading} loading): {failure.problem}",
+            why=failure.why,
+            cure=failure.cure,
+        ) from failure
+
 
 def _solve(path: LoadingPath, k: FloatArray) -> Arrays:
     """Return spectra (L, K) in N, derivatives by logarithms (zero where not needed), numbers."""
@@ -189,14 +217,14 @@ def _solve(path: LoadingPath, k: FloatArray) -> Arrays:
     if path.derivatives:
         visited += [factor * loads for factor in _NEIGHBOURS]
     order = np.argsort(visited, axis=None, kind="stable")
-    solved = _contacts(path, np.ravel(visited)[order])
+    solved = path.contacts(np.ravel(visited)[order])
     contacts = [solved[place] for place in np.argsort(order)]
 
     def spectra_of(group: int, k: FloatArray) -> FloatArray:
         """Spectra at the loads, or at a group of their neighbours."""
         some = contacts[group * loads.size : (group + 1) * loads.size]
-        spectrum = Contact.base_shear_spectrum if path.order else Contact.base_spectrum
-        return np.array([spectrum(contact, k) for contact in some])
+        spectrum = "base_shear_spectrum" if path.order else "base_spectrum"
+        return np.array([getattr(contact, spectrum)(k) for contact in some])
 
     spectra = spectra_of(0, k)
     by_load = np.zeros_like(spectra)
@@ -216,35 +244,6 @@ def _solve(path: LoadingPath, k: FloatArray) -> Arrays:
         "contact_radii": np.array([contact.contact_radius for contact in nominal]),
         "convergence": np.array([contact.convergence for contact in nominal]),
     }
-
-
-def _contacts(path: LoadingPath, loads: FloatArray) -> list[Contact]:
-    """Solve the contacts of a path at increasing loads."""
-    usual = _RINGS_OF_A_RIGID_CONTACT if path.interface.rigid else _RINGS_OF_A_COMPLIANT_CONTACT
-    for rings in (usual, *_OTHER_RINGS):
-        try:
-            return indent(
-                path.film,
-                path.indenter,
-                load=loads,
-                friction=path.friction,
-                # Without friction the way makes no difference, and the solution is remembered.
-                loading=path.loading if path.friction > 0 else "incremental",
-                interface=path.interface,
-                strain="linear",
-                rings=rings,
-            )
-        except (ConvergenceError, DomainError) as error:
-            failure = error
-            if isinstance(error, DomainError):
-                break
-    raise type(failure)(
-        f"The contact of a sphere of radius {path.indenter.radius * 1e3:.4g} mm with a film of "
-        f"{path.film.thickness * 1e3:.4g} mm cannot be calculated up to {max(path.loads):g} N "
-        f"(friction {path.friction:g}, {path.loading} loading): {failure.problem}",
-        why=failure.why,
-        cure=failure.cure,
-    ) from failure
 
 
 #: Raised where the same request gives other numbers within one version.
@@ -321,6 +320,7 @@ class FamilySetup:
                 axes = {"value": values, "load": self.loads, "k": k}
                 keep_contact_table(self.cache, key, axes | arrays)
         changes = [name for name in arrays if name.startswith(_CHANGE)]
+        members: Values = {name: arrays[name] for name in ("spectra", "by_load", *_NUMBERS)}
         return ProfileFamily(
             name=name,
             loading=loading,
@@ -331,7 +331,7 @@ class FamilySetup:
             changes={source.removeprefix(_CHANGE): arrays[source] for source in changes},
             notes=notes,
             order=self.order,
-            **{name: arrays[name] for name in ("spectra", "by_load", *_NUMBERS)},
+            **members,
         )
 
     def _calculated(

@@ -30,6 +30,7 @@ from memscal.friction.family import ProfileFamily
 from memscal.friction.marginal_likelihood import Statistics, added, log_likelihood
 from memscal.measurement.posterior import input_changes, sensor_changes, shared_changes
 from memscal.model.arrays import (
+    ArrayFunction,
     ArrayPair,
     Arrays,
     ArrayTriple,
@@ -143,7 +144,7 @@ def load_points(profile: MeasuredProfile, channel: str = "zz") -> LoadPoints:
     drift = (position - middle) / (np.ptp(position) / 2)
     places = None
     if points.x_errors.any() and not profile.scan.position_errors_by_repeat:
-        places = _own(position.round(12).tolist())
+        places = indicators(position.round(12).tolist())
     return LoadPoints(
         u=points.u,
         offset=position - profile.centre[profile.axis],
@@ -172,20 +173,20 @@ def points_of(
     between_scan_gain: float = BETWEEN_SCAN_GAIN,
 ) -> list[LoadPoints]:
     """Return the points of profiles, with what each scan and each load cell has for itself."""
-    scans = _own([id(profile.scan) for profile in profiles])
+    scans = indicators([id(profile.scan) for profile in profiles])
     # A load cell that is not named is none of the others.
     cells = []
     for profile in profiles:
         cell = profile.scan.load_cell
         cells.append(cell.serial_number or cell.name or id(profile.scan))
     points = []
-    for profile, scan, load_cell in zip(profiles, scans, _own(cells), strict=True):
+    for profile, scan, load_cell in zip(profiles, scans, indicators(cells), strict=True):
         own = {"own_gain": between_scan_gain, "scan": scan, "load_cell": load_cell}
         points.append(replace(load_points(profile, channel), **own))
     return points
 
 
-def _own(keys: Sequence[Hashable]) -> FloatArray:
+def indicators(keys: Sequence[Hashable]) -> FloatArray:
     """Return a row for each of the keys: one in the column of its kind."""
     kinds = list(dict.fromkeys(keys))
     return np.eye(len(kinds))[[kinds.index(key) for key in keys]]
@@ -314,9 +315,22 @@ def predict(points: LoadPoints, sensor: Sensor, members: ProfileFamily, load: in
         return sign * (spectra @ kernel.T)[:, place]
 
     transfer = sensor.transfer
+    slope = at_points(transfer * members.spectra[:, load], derivative * weights * k)
+    return changes_at(points, sensor, members, load, at_points, slope)
+
+
+def changes_at(
+    points: LoadPoints,
+    sensor: Sensor,
+    members: ProfileFamily,
+    load: int,
+    at_points: ArrayFunction,  # from spectra (V, K) to voltages (V, n)
+    slope: FloatArray,  # (V, n), in V/m
+) -> Predicted:
+    """Return what the sensor reads of members, with its changes, by their inverse transforms."""
+    transfer = sensor.transfer
     spectra = members.spectra[:, load]
     by_load = at_points(transfer * members.by_load[:, load])
-    slope = at_points(transfer * spectra, derivative * weights * k)
     columns = {}
     if sensor.changes.size:
         changed = [at_points(change * spectra) for change in sensor.changes.T]
@@ -380,10 +394,10 @@ def stacked(normal: Readings, shear: Readings) -> Readings:
         **joined(points, names, axis=0),
         flat=block_diag(normal[0].flat, shear[0].flat),
         correlation=block_diag(*correlations),
-        contacts=_own(contacts),
+        contacts=indicators(contacts),
     )
     if points[0].places is not None:
-        together = replace(together, places=_own(together.offset.round(12).tolist()))
+        together = replace(together, places=indicators(together.offset.round(12).tolist()))
     columns = [dict(channel.columns) for channel in predicted]
     if "apparatus" in columns[1]:
         columns[1]["apparatus_shear"] = columns[1].pop("apparatus")

@@ -111,6 +111,10 @@ joint_chi_square: all loads of a kind against one friction coefficient, chi-squa
     friction changes with the load: see each coefficient, or --interface
 lubricated_frictionless: lubricated loads against no friction: rise of -2 ln p
     more friction than counted, or a wrong A, load or thickness: doubt the dry ones
+tangential_load: sliding friction against the tangential load over the load, in u
+    check both load cells, direction, film and thickness
+sliding_friction: sliding friction against the stated one, in u
+    as tangential_load
 dead_taxels: sensors without a signal
     left out: press on them, look at their wiring
 ends_covered: what a scan lacks of two thicknesses beyond the last sensor

@@ -120,6 +120,19 @@ def require_pressed(motion: str, source: SourceFile | None) -> None:
         )
 
 
+def require_sliding(motion: str, source: SourceFile | None) -> None:
+    """Refuse the scan of an indenter that did not slide."""
+    if motion != "sliding":
+        raise InputError(
+            f"{source.file_name if source else 'The scan'} does not state that its indenter slid "
+            "(/entry/indenter/motion).",
+            why="Sliding contacts (sliding, --sliding) are not those of an indenter that is "
+            "pressed.",
+            cure="Leave out --sliding (sliding=True), or state the motion: memscal import "
+            "--sliding.",
+        )
+
+
 def branch_numbers(name: str, stated: ArrayLike) -> NDArray[np.int64]:
     """Return branches, given by number or by word, as an array of numbers."""
     values = np.asarray(unmasked(stated))

@@ -48,7 +48,7 @@ def mapping(comparison: FrictionComparison) -> Values:
     ]
     whole["loads"] = [_load(comparison, i) for i in range(len(comparison.measured.profiles))]
     whole["joint"] = [
-        {"lubrication": lubrication, "loading": loading, **_estimate(comparison, estimate)}
+        {"lubrication": lubrication, "loading": loading, **estimate_json(comparison, estimate)}
         for lubrication, loading, estimate in _joint(comparison)
     ]
     if not comparison.by_shear:
@@ -163,7 +163,7 @@ def _load(comparison: FrictionComparison, index: int) -> Values:
     profile = comparison.measured.profiles[index]
     if comparison.by_shear:
         by_loading = {
-            loading or "given": _estimate(comparison, loads[index])
+            loading or "given": estimate_json(comparison, loads[index])
             for loading, loads in comparison.by_shear.items()
         }
         held = members(records.STRESS_NUMBERS.quantities[:1], profile)
@@ -195,8 +195,8 @@ def _by_loading(comparison: FrictionComparison, load: LoadComparison) -> Values:
         profiles.append(members(records.CALCULATED, None, **calculated))
     return {
         "effective_friction_coefficient": {
-            "by_maximum": _estimate(comparison, load.by_maximum),
-            "by_profile": _estimate(comparison, load.by_profile),
+            "by_maximum": estimate_json(comparison, load.by_maximum),
+            "by_profile": estimate_json(comparison, load.by_profile),
         },
         "bracketed": finite(load.bracketed),
         "degrees": load.degrees,
@@ -204,7 +204,7 @@ def _by_loading(comparison: FrictionComparison, load: LoadComparison) -> Values:
     }
 
 
-def _estimate(comparison: FrictionComparison, estimate: BoundedEstimate) -> Values:
+def estimate_json(comparison: FrictionComparison, estimate: BoundedEstimate) -> Values:
     """Return an estimate with its fit and its profile likelihood."""
     # An estimated noise is as large as the misfit: a chi-square by it tests nothing.
     fit = {} if comparison.measured.noise_stated else {"least": None, "p_value": None}
@@ -369,7 +369,7 @@ def _maxima_table(comparison: FrictionComparison) -> Table:
 
 def _labels(number: int, profile: MeasuredProfile) -> tuple[str, str, str]:
     """Return number, state and load of a profile; checks and messages use the number."""
-    return str(number), profile.lubrication or "not stated", f"{profile.load:.4g}"
+    return str(number), profile.state or "not stated", f"{profile.load:.4g}"
 
 
 def _friction_table(comparison: FrictionComparison, loading: str) -> Table:
@@ -378,7 +378,7 @@ def _friction_table(comparison: FrictionComparison, loading: str) -> Table:
     tests = ["χ²/ν", "p"] if comparison.measured.noise_stated else []
     head = ["by the maximum", "by the profile", *tests, "bracketed"]
     if comparison.by_shear:
-        head = ["by the shear", *tests]
+        head = ["by the shear" if comparison.shear else "by the profile", *tests]
     rows = []
     level = "95 %"
     for lubrication, by_loading in comparison.joint.items():

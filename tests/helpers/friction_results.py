@@ -64,6 +64,7 @@ def measured_profile(load: float, lubrication: str, friction: float, rng):
     return SimpleNamespace(
         scan=_scan(lubrication),
         lubrication=lubrication,
+        state=lubrication,
         x=x,
         r=r,
         s_zz=clean + rng.normal(0.0, errors),

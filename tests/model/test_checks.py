@@ -7,7 +7,7 @@ import memscal
 from memscal.model.checks import EXPLANATIONS
 
 ROOT = Path(__file__).parents[2]
-DECLARED = re.compile(r"\b(?:check|_reduced|_added|_tested)\(\s*f?\"(\w+?)(?:_?\{(\w*)|\")")
+DECLARED = re.compile(r"\b(?:check|reduced_check|_added|_tested)\(\s*f?\"(\w+?)(?:_?\{(\w*)|\")")
 
 
 def test_every_check_that_is_declared_is_explained():

@@ -1,0 +1,304 @@
+r"""Friction from sliding: the coefficient by which sliding contacts explain measured profiles.
+
+Sliding friction shifts and skews the stress at the base of a film.  A pass with a centre of its own
+tells the coefficient by the skew; two passes against each other share the centre, but for the
+stage's backlash b, and tell it by the shift, too:
+
+.. math:: U(X) = A\,(G \otimes \sigma_\mu)(d\,(c + d\,b/2 - X)) + \text{baseline} + \text{drift},
+
+with the direction d of each pass, +1 or -1: a sensor at c is ahead of an indenter that slides along
+the positions while that is at a smaller X.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from scipy.ndimage import map_coordinates
+
+from memscal.apparatus import ApparatusFunction
+from memscal.errors import InputError
+from memscal.extensions.motion.sliding_family import SLIDING, LineNodes, sliding_family
+from memscal.friction.checks import comparison_messages, reduced_check
+from memscal.friction.effective import EXPANDED, FrictionFit, fit_friction, with_loading
+from memscal.friction.family import ProfileFamily
+from memscal.friction.likelihood import (
+    Channel,
+    LoadPoints,
+    Predicted,
+    Readings,
+    Sensor,
+    changes_at,
+    indicators,
+    points_of,
+    sensor_of,
+    standardise,
+)
+from memscal.friction.results import BoundedEstimate, FrictionComparison
+from memscal.model.arrays import (
+    ArrayPair,
+    FloatArray,
+    Values,
+    array_record,
+    floats,
+    keyword_array_record,
+)
+from memscal.model.checks import FAILED_CHECK, QualityCheck, check
+from memscal.model.measured_stress import MeasuredProfile, MeasuredStress
+
+#: Loads that differ by less than this share are one.
+_SAME_LOAD = 0.05
+#: Standard deviation of a centre that is not known, in m.
+_ANYWHERE = 0.1
+
+
+@keyword_array_record
+class SlidingPoints(LoadPoints):
+    """Voltages of one pass; ``offset`` is from a place that all passes have in common."""
+
+    way: (
+        int  # -1 where the indenter slid along the positions, and the sensor came from ahead, or +1
+    )
+    start: float  # near the centre, in m
+    sharing: FloatArray  # (c,): one where the pass shares a centre with others
+    backlash: float  # standard uncertainty, in m
+
+
+@array_record
+class SlidingChannel(Channel):
+    """What a sensor reads of sliding contacts."""
+
+    def readings(self, load: int) -> Readings:
+        """Return the points of a pass, by its index, and what is predicted there."""
+        points: Any = self.points[load]
+        return points, _predicted(points, self.sensor, self.family, load)
+
+
+def _predicted(
+    points: SlidingPoints, sensor: Sensor, members: ProfileFamily, load: int
+) -> Predicted:
+    """Return what the sensor reads of members, each about the centre that fits it best."""
+    nodes: Any = members.wavenumbers
+    signal = _along(nodes, sensor.transfer * members.spectra[:, load])
+    slope = np.gradient(signal, nodes.line, axis=1)
+    places, centre = _best_places(points, nodes, signal, slope)
+
+    def at_points(spectra: FloatArray) -> FloatArray:
+        return _read(_along(nodes, spectra), places)
+
+    by_centre = -points.way * _read(slope, places)
+    from_axis = -by_centre * np.sign(points.offset)
+    predicted = changes_at(points, sensor, members, load, at_points, from_axis)
+    moved = by_centre[..., None] * points.sharing
+    own = {
+        "centre": _ANYWHERE * moved,
+        "backlash": points.backlash / 2 * points.way * moved,
+    }
+    # Seen from the common place, in proportion to the distance.
+    signal = predicted.signal - centre * by_centre
+    return replace(predicted, signal=signal, columns={**predicted.columns, **own})
+
+
+def _along(nodes: LineNodes, spectra: FloatArray) -> FloatArray:
+    """Inverse transforms (V, m) of spectra (V, K) along the line of the nodes."""
+    return spectra @ nodes.waves.T
+
+
+def _read(values: FloatArray, places: FloatArray) -> FloatArray:
+    """Read values (V, m) at places (V, n) along the line, in its steps."""
+    rows = np.broadcast_to(np.arange(len(values))[:, None], places.shape)
+    return floats(map_coordinates(values, [rows, places], mode="nearest"))
+
+
+#: Steps by which a centre is found, and the longest of them in those of the line.
+_STEPS = 12
+_LONGEST = 10
+
+
+def _best_places(
+    points: SlidingPoints, nodes: LineNodes, signal: FloatArray, slope: FloatArray
+) -> ArrayPair:
+    """Return where each reading lies in each member's contact, (V, n), and the centres (V, 1)."""
+    step = nodes.line[1] - nodes.line[0]
+    baseline = np.linalg.qr(points.flat / points.noise[:, None])[0]
+    centre = np.full((len(signal), 1), points.start)
+    moved = np.zeros_like(centre)
+    for _ in range(_STEPS):
+        centre = centre + np.clip(moved, -_LONGEST * step, _LONGEST * step)
+        places = (points.way * (points.offset - centre) - nodes.line[0]) / step
+        rest = (points.u - _read(signal, places)) / points.noise
+        by_centre = -points.way * _read(slope, places) / points.noise
+        by_centre -= by_centre @ baseline @ baseline.T
+        moved = np.sum(by_centre * rest, 1, keepdims=True)
+        moved /= np.sum(by_centre**2, 1, keepdims=True)
+    return places, centre
+
+
+@keyword_array_record
+class SlidingComparison(FrictionComparison):
+    """Measured stress against contacts that slide, with the friction that explains it.
+
+    ``joint`` is of all passes of a lubrication together, ``by_shear`` of those of the load and
+    speed of each measured profile, and ``speeds`` by lubrication and speed (m/s), where there are
+    several.  ``curves`` (3, n) of each profile: position in m, measured and calculated stress as
+    the sensor blurs it, in Pa.
+    """
+
+    speeds: Mapping[tuple[str, float], BoundedEstimate]
+    curves: tuple[FloatArray, ...]
+    backlash: float | None
+
+
+def compare_sliding(
+    measured: MeasuredStress,
+    apparatus: ApparatusFunction,
+    setting: Values,
+    between_scan_gain: float,
+    backlash: float | None,
+) -> SlidingComparison:
+    """Hold measured stress against sliding contacts; ``setting``: that of a family."""
+    # What a restoration's checks test is a round stress.
+    others = tuple(each for each in measured.messages if each.kind != FAILED_CHECK)
+    measured = replace(measured, checks=(), process=replace(measured.process, messages=others))
+    profiles = measured.profiles
+    loads = np.sort(measured.loads)
+    larger = loads[1:][np.diff(loads) > _SAME_LOAD * loads[:-1]]
+    numbers = np.searchsorted(larger, measured.loads, "right").tolist()
+    states = [profile.lubrication for profile in profiles]
+    speeds = [(profile.lubrication, profile.scan.speed) for profile in profiles]
+    keys = [*zip(speeds, numbers, strict=True)]
+
+    family = sliding_family(setting)
+    sensor = sensor_of(apparatus, family, setting["reach"], measured.scans)
+    sharing = indicators(range(len(keys)) if backlash is None else keys)
+    points = _points(profiles, sharing, between_scan_gain, backlash or 0.0)
+    at_loads = family.only(np.searchsorted(family.loads, measured.loads).tolist())
+    fit = fit_friction(SlidingChannel(points, sensor, at_loads))
+    tested = measured.noise_stated
+    joint = {state: {SLIDING: found} for state, found in _by(states, fit, tested).items()}
+    each = _by(keys, fit, tested)
+    by_speed = _by(speeds, fit, tested)
+    stated = {(state, speed): by_speed[state, speed] for state, speed in by_speed if speed}
+    checks: list[QualityCheck] = []
+    if tested:
+        checks += _misfits("joint_chi_square", "all passes of a speed", by_speed.values())
+        checks += _misfits("profile_chi_square", "the passes of a load", each.values())
+    checks += _agreements(profiles, [each[key] for key in keys])
+    return SlidingComparison(
+        measured=measured,
+        friction=family.values,
+        loads={},
+        by_shear={SLIDING: tuple(each[key] for key in keys)},
+        joint=joint,
+        checks=tuple(checks),
+        messages=comparison_messages(measured, {SLIDING: family}, joint, tuple(checks)),
+        speeds=stated if len(stated) > 1 else {},
+        curves=tuple(_curve(fit, i, each[key].best) for i, key in enumerate(keys)),
+        backlash=backlash,
+    )
+
+
+def _by(keys: Sequence[Any], fit: FrictionFit, tested: bool) -> dict[Any, BoundedEstimate]:
+    """Return the coefficient of the passes of each key."""
+    groups: dict[Any, list[int]] = {}
+    for i, key in enumerate(keys):
+        groups.setdefault(key, []).append(i)
+    found = {}
+    for key, chosen in groups.items():
+        (found[key],) = with_loading({SLIDING: fit.coefficient(chosen)}, tested=tested).values()
+    return found
+
+
+def _points(
+    profiles: Sequence[MeasuredProfile],
+    sharing: FloatArray,
+    between_scan_gain: float,
+    backlash: float,
+) -> list[SlidingPoints]:
+    """Return the points of each pass; ``sharing``: a row for each, one in the centre's column."""
+    centres = np.array([profile.centre[profile.axis] for profile in profiles])
+    middle = centres.mean()
+    points = []
+    for i, single in enumerate(points_of(profiles, between_scan_gain=between_scan_gain)):
+        profile = profiles[i]
+        if not profile.direction:
+            raise InputError(
+                f"{profile.label}: the direction of sliding is not stated.",
+                why="Friction shifts the stress ahead of the indenter.",
+                cure="State it (/entry/data/direction): memscal import --sliding forth or back.",
+            )
+        own: Values = {
+            "offset": single.offset + centres[i] - middle,
+            # Outliers were told by a round stress.
+            "noise": profile.points["zz"].noise,
+            "free_centre": False,
+            "way": -int(profile.direction),
+            "start": centres[i] - middle,
+            "sharing": sharing[i],
+            "backlash": backlash,
+        }
+        points.append(SlidingPoints(**(vars(single) | own)))
+    return points
+
+
+def _curve(fit: FrictionFit, index: int, friction: float) -> FloatArray:
+    """Return positions of a pass, its stress without baseline and drift, and the fit, (3, n)."""
+    channel = fit.channel.at(friction)
+    points: Any
+    points, predicted = channel.readings(index)
+    reduced = standardise(points, predicted)
+    _, (projection,), (information,), _ = reduced.statistics
+    systematic = np.linalg.solve(information + np.eye(len(information)), projection)
+    fitted = predicted.signal + np.concatenate([*predicted.columns.values()], 2) @ systematic
+    order, _ = points.shared_noise()
+    x, noise, fitted = np.stack([points.offset, points.noise, fitted[0]])[:, order]
+    rest = noise * (reduced.residual - reduced.columns @ systematic)[0]
+    a = channel.sensor.conversion_constant
+    return np.stack([x, (fitted + rest) / a, fitted / a])
+
+
+def _misfits(name: str, what: str, frictions: Iterable[BoundedEstimate]) -> Iterator[QualityCheck]:
+    """Yield the checks of chi-square."""
+    for i, found in enumerate(frictions, start=1):
+        yield reduced_check(
+            f"{name}_{i}",
+            [found],
+            f"Reduced chi-square of {what} against the sliding friction that explains them best. "
+            "A failure means that no sliding contact does: noise larger than stated, another "
+            "shape, or a film, gain or load that is not as stated.",
+        )
+
+
+def _agreements(
+    profiles: Sequence[MeasuredProfile], frictions: Sequence[BoundedEstimate]
+) -> Iterator[QualityCheck]:
+    """Yield the checks of the coefficient of each pass against what is known otherwise."""
+    for i, (profile, found) in enumerate(zip(profiles, frictions, strict=True), start=1):
+        scan = profile.scan
+        known = {"sliding_friction": (scan.sliding_friction, scan.sliding_friction_uncertainty)}
+        if profile.tangential_load is not None:
+            ratio = abs(profile.tangential_load) / profile.load
+            known["tangential_load"] = (
+                ratio,
+                ratio * (profile.load_uncertainty or 0.0) / profile.load,
+            )
+        spread = (found.interval.upper - found.interval.low) / (2 * EXPANDED)
+        for name, (value, u_value) in known.items():
+            if value is None:
+                continue
+            u = math.hypot(spread, u_value or 0.0)
+            off = abs(found.best - value) / u
+            yield check(
+                f"{name}_{i}",
+                off,
+                3.0,
+                f"Difference of the sliding friction at {profile.label}, {found.best:.3g}, from "
+                f"{value:.3g}, in its standard uncertainty of {u:.2g}. A failure means that a load "
+                "cell, the film or the direction is not as stated, or that the shear is not in "
+                "proportion to the pressure.",
+                math.erfc(off / math.sqrt(2)),
+            )
