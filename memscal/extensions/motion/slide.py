@@ -16,7 +16,7 @@ by zero-padded FFT.
 
 The coupling X, which makes the influence unsymmetric, is part of every step: in a set of cells in
 contact pressure and depth are solved for by GMRES, and the set is corrected (cells in tension
-leave, cells that would pass through the indenter enter) until it stays, after three to six steps.
+leave, cells that would pass through the indenter enter) until it stays, after two to six steps.
 An antisymmetric influence does no work: the problem is as definite as that without friction.
 """
 
@@ -176,7 +176,7 @@ def solve_sliding(
         pressure=film.young_modulus / h * pressure,
         depth=depth,
     )
-    if np.any(pressure != np.pad(pressure[1:-1, 1:-1], 1)):
+    if pressure[0].any() or pressure[:, [0, -1]].any():
         # The window cuts off a part of the contact.
         wider = Region(*np.multiply(_MARGIN, start))
         return solve_sliding(film, indenter, load, friction, wider, cells)
@@ -188,7 +188,7 @@ def _balanced(heights: FloatArray, influence: FloatArray, total: float) -> tuple
     cells = len(heights)
     padded = influence.shape
     waves = rfft2(influence)
-    inside = heights >= 0  # all cells
+    inside = heights < heights[0].min()  # a disc
 
     def pressed(unknown: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return pressures by depth and those inside, and how far they depress the film below."""

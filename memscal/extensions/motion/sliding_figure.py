@@ -17,8 +17,8 @@ def sliding_figure(contact: SlidingContact) -> Figure:
     reach = contact.region.high + _AROUND * contact.film.thickness
     x = np.linspace(-reach, reach, _PLACES)
     with panels_of(3.0, 1, 2, note="") as (figure, (along, above)):
-        pressure = contact.interface_pressure(x, 0.0) / KPA
-        along.plot(x / MM, pressure, "--", color=MEASURED, label="pressure on the film")
+        pressure = contact.interface_pressure(x, 0.0)
+        along.plot(x / MM, pressure / KPA, "--", color=MEASURED, label="pressure on the film")
         field = contact.base_stress(x, x[:, None]) / KPA
         along.plot(x / MM, field[_PLACES // 2], color=DECONVOLVED, label="stress at the base")
         along.set(xlabel="$x$ (mm), at $y = 0$", ylabel="normal stress (kPa)")

@@ -20,6 +20,8 @@ def mapping(contact: SlidingContact) -> Values:
 
 def tables(contact: SlidingContact) -> list[Table]:
     """Return a row for each number."""
-    numbers = zip(_QUANTITIES, mapping(contact).values(), strict=True)
-    rows = [(quantity.heading, f"{number['value']:.4g}") for quantity, number in numbers]
+    rows = [
+        (quantity.heading, f"{number['value']:.4g}")
+        for quantity, number in zip(_QUANTITIES, mapping(contact).values(), strict=True)
+    ]
     return [Table(f"A {contact.indenter.shape} that slides on a film", ("", ""), rows)]
