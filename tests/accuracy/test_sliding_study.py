@@ -83,5 +83,5 @@ def test_the_coefficient_is_as_sure_as_it_says(friction, ways):
 @WAYS
 def test_without_friction_there_is_a_bound(ways):
     bounds = [one.interval for one in estimates(0.0, ways)]
-    assert np.mean([bound.low == 0 for bound in bounds]) > 0.8
+    assert sum(bound.low == 0 for bound in bounds) >= binom.ppf(CHANCE, len(bounds), 0.95)
     assert np.median([bound.upper for bound in bounds]) < 3 * BOUNDS[ways]

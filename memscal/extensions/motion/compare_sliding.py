@@ -185,8 +185,7 @@ def compare_sliding(
     stated = {(state, speed): by_speed[state, speed] for state, speed in by_speed if speed}
     checks: list[QualityCheck] = []
     if tested:
-        checks += _misfits("joint_chi_square", "all passes of a speed", by_speed.values())
-        checks += _misfits("profile_chi_square", "the passes of a load", each.values())
+        checks += _misfits(by_speed.values())
     checks += _agreements(profiles, [each[key] for key in keys])
     return SlidingComparison(
         measured=measured,
@@ -261,15 +260,15 @@ def _curve(fit: FrictionFit, index: int, friction: float) -> FloatArray:
     return np.stack([x, (fitted + rest) / a, fitted / a])
 
 
-def _misfits(name: str, what: str, frictions: Iterable[BoundedEstimate]) -> Iterator[QualityCheck]:
+def _misfits(by_speed: Iterable[BoundedEstimate]) -> Iterator[QualityCheck]:
     """Yield the checks of chi-square."""
-    for i, found in enumerate(frictions, start=1):
+    for i, found in enumerate(by_speed, start=1):
         yield reduced_check(
-            f"{name}_{i}",
+            f"joint_chi_square_{i}",
             [found],
-            f"Reduced chi-square of {what} against the sliding friction that explains them best. "
-            "A failure means that no sliding contact does: noise larger than stated, another "
-            "shape, or a film, gain or load that is not as stated.",
+            "Reduced chi-square of all passes of a speed against the sliding friction that "
+            "explains them best. A failure means that none does: friction changes with the load, "
+            "the noise is larger than stated, or shape, film, gain or load are not as stated.",
         )
 
 

@@ -39,7 +39,7 @@ FRICTIONS = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0, 1.5, 2.0)
 """Friction coefficients of the contacts that are solved."""
 
 #: Cells across a contact.
-_CELLS = 32
+_CELLS = 48
 #: Orders beyond these are below 1e-5 of the stress on the axis at a friction of 0.6, below 7e-4 at
 #: 2; angles by which they are found.
 _ORDERS = 9
