@@ -5,7 +5,6 @@ wavenumber (:func:`helpers.outside.answers`); where they act is found by solving
 once.  Lengths are in thicknesses, stresses in shear moduli times h/R, as every film has them.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 
@@ -14,7 +13,6 @@ from helpers.outside import DEEP, SIGMA, A, answers
 from scipy.interpolate import CubicSpline
 
 from memscal import ElasticFilm, Scan, Sphere
-from memscal.model.arrays import FloatArray
 
 STEP = 0.06
 CELLS = 400
@@ -41,14 +39,14 @@ FILM = ElasticFilm(
 
 
 @cache
-def film() -> tuple[CubicSpline, CubicSpline]:
+def film():
     """Depression times q, and normal base stress, by (shear, pressure), along q."""
     q = np.linspace(0.0, DEEP, 801)
     surface, base = answers(FILM.poisson_ratio, q)
     return CubicSpline(q, surface[:, 1] * q[:, None]), CubicSpline(q, base[:, 1])
 
 
-def by_pressure(which: int, friction: float, qx: FloatArray, qy: FloatArray) -> FloatArray:
+def by_pressure(which, friction, qx, qy):
     """Depression (0) or base stress (1) per pressure with its shear, complex."""
     q = np.hypot(qx, qy)
     shear, pressure = np.moveaxis(film()[which](np.minimum(q, DEEP)), -1, 0)
@@ -59,7 +57,7 @@ def by_pressure(which: int, friction: float, qx: FloatArray, qy: FloatArray) -> 
 
 
 @cache
-def contact(load: float, friction: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+def contact(load, friction):
     """Places (n,) and forces (n,) of the cells that touch under a load."""
     q = 2 * np.pi * np.fft.fftfreq(CELLS, STEP)
     influence = np.fft.ifft2(by_pressure(0, friction, q[:, None], q)).real
@@ -89,7 +87,7 @@ def contact(load: float, friction: float) -> tuple[FloatArray, FloatArray, Float
 
 
 @cache
-def stresses(load: float, friction: float) -> FloatArray:
+def stresses(load, friction):
     """Transforms (loads, Q, Q) of the base stress over the load, complex."""
     found = []
     base = by_pressure(1, friction, Q[:, None], Q)
@@ -111,12 +109,12 @@ class Slid:
     young_modulus: float = FILM.young_modulus
     thickness: float = FILM.thickness
 
-    def scaled(self, load: float, young_modulus: float, thickness: float) -> float:
+    def scaled(self, load, young_modulus, thickness):
         """A load in units of the contact's."""
         shear_modulus = young_modulus / (2 * (1 + FILM.poisson_ratio))
         return load * SPHERE.radius / (shear_modulus * thickness**3)
 
-    def voltages(self, x: FloatArray, direction: int = 1) -> FloatArray:
+    def voltages(self, x, direction=1):
         """Voltages (n,) of a Gaussian sensor by positions of the sphere from it, in V."""
         nominal = self.scaled(self.load, FILM.young_modulus, FILM.thickness)
         load = self.load * self.load_scale
@@ -135,14 +133,14 @@ _OTHERS = [(a, np.arange(AROUND.size) != i) for i, a in enumerate(AROUND)]
 
 
 def sliding_scan(
-    slid: Slid,
-    seed: int,
-    directions: Sequence[int] = (1,),
+    slid,
+    seed,
+    directions=(1,),
     *,
-    backlash: float = 0.0,
-    share: float = NOISE,
+    backlash=0.0,
+    share=NOISE,
     **stated,
-) -> Scan:
+):
     """Return a scan of passes in directions whose positions differ by a backlash, in m."""
     rng = np.random.default_rng(seed)
     x = np.linspace(-10e-3, 10e-3, 201)

@@ -43,7 +43,6 @@ from memscal.model.arrays import (
     ArrayPair,
     FloatArray,
     Values,
-    array_record,
     floats,
     keyword_array_record,
 )
@@ -68,7 +67,6 @@ class SlidingPoints(LoadPoints):
     backlash: float  # standard uncertainty, in m
 
 
-@array_record
 class SlidingChannel(Channel):
     """What a sensor reads of sliding contacts."""
 

@@ -30,7 +30,6 @@ from memscal.model.arrays import (
     Values,
     array_record,
     floats,
-    keyword_value_record,
 )
 
 SLIDING = "sliding"
@@ -92,7 +91,6 @@ def line_spectrum(contact: SlidingContact, k: FloatArray) -> FloatArray:
     return np.concatenate(orders)
 
 
-@keyword_value_record
 class SlidingPath(LoadingPath):
     """Sliding contacts at several loads; each is the same whatever the way to it."""
 
