@@ -21,6 +21,7 @@ NOT_PUBLIC = {
     "KernelModes",
     "LawComparison",
     "NoiseSpectrum",
+    "Region",
     "OtherEstimate",
     "Posterior",
     "Reading",

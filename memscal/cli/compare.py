@@ -125,8 +125,8 @@ Examples:
     "Compare scans of a sphere that slid (/entry/indenter/motion) with contacts that slide."
 )
 @option("--backlash", NonNegative("um"))(
-    "Standard uncertainty of the difference of positions between sliding forth and back, which "
-    "have one centre then.  [default: each has its own]"
+    "Standard uncertainty of the difference of positions between sliding forth and back, in um, "
+    "which have one centre then.  [default: each has its own]"
 )
 @contact_options
 @option("--cache", FILE, metavar="FOLDER")(

@@ -620,7 +620,9 @@ def test_one_direction_is_that_of_all_readings():
     assert (given.kind, given.speed) == ("line", 1e-3)
 
 
-@pytest.mark.parametrize(("way", "words"), [(0, "directions of sliding"), ("up", "forth or back")])
+@pytest.mark.parametrize(
+    ("way", "words"), [(0, "directions of sliding"), ("up", "none of forth, back")]
+)
 def test_what_is_no_direction_is_refused(way, words):
     with pytest.raises(InputError, match=words):
         import_table({"U (mV)": [1], "t (s)": [0], "way": [way]}, **MOVED, sliding="way")
