@@ -352,8 +352,8 @@ def _direct(restored: Restoration, spectrum: FloatArray) -> tuple[float, int]:
     by_load = (scan.load_uncertainty or 0.0) / scan.stated_load * signal[:, None]
     by_load = by_load + posterior.shifts.get("load", 0.0)
     # The film is not part of the direct way: the calculated stress is at its base already.
-    names = {"apparatus", "position_scale", "dynamics"}.intersection(posterior.shifts)
-    shifts = [by_load, *(posterior.shifts[name] for name in names)]
+    names = ("apparatus", "position_scale", "dynamics")
+    shifts = [by_load, *(posterior.shifts[name] for name in names if name in posterior.shifts)]
     # The stated noise as it is: raised by a misfit, it would hide it.
     noise = posterior.noise_ratio * estimate.noise_scale
     if points.noise_stated:

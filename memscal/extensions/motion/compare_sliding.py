@@ -59,9 +59,8 @@ _ANYWHERE = 0.1
 class SlidingPoints(LoadPoints):
     """Voltages of one pass; ``offset`` is from a place that all passes have in common."""
 
-    way: (
-        int  # -1 where the indenter slid along the positions, and the sensor came from ahead, or +1
-    )
+    # -1 where the indenter slid along the positions, and the sensor came from ahead; else +1.
+    way: int
     start: float  # near the centre, in m
     sharing: FloatArray  # (c,): one where the pass shares a centre with others
     backlash: float  # standard uncertainty, in m
