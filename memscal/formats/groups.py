@@ -25,7 +25,14 @@ from memscal.model.instrument import Dynamics, Equipment, LoadCell, StressSensor
 from memscal.model.measured_stress import MeasuredScan
 from memscal.model.notation import VOLTS, Reading
 from memscal.model.provenance import Process, SourceFile
-from memscal.model.quantities import TRUTH, Quantity, Record, estimated_quantity
+from memscal.model.quantities import (
+    DIMENSIONS,
+    TRUTH,
+    Quantity,
+    Record,
+    dimension_with,
+    estimated_quantity,
+)
 from memscal.model.scan import Scan
 from memscal.model.stress import IdealReference, StressField, StressProfile
 
@@ -181,7 +188,8 @@ def parameter_dimension(name: str, unit: str = "", reading: Reading = VOLTS) -> 
         # The longest name that the parameter's begins with.
         return TRUTH[max(known, key=len)].read_in(reading).dimension
     if unit:
-        return dimension_of(unit, f"parameter {name}")
+        dimension = dimension_with(unit, reading)
+        return dimension if dimension in DIMENSIONS else dimension_of(unit, f"parameter {name}")
     raise InputError(
         f"The unit of {name} is not known.",
         why="Every number in a file carries its unit.",

@@ -262,7 +262,14 @@ def name_and_scan(name: str) -> tuple[str, str]:
     return (start, number) if start in ESTIMATED and number.isdigit() else (name, "")
 
 
-def estimated_quantity(name: str, si_unit: str = "") -> Quantity:
+def dimension_with(si_unit: str, reading: Reading) -> str:
+    """Return the dimension of numbers in an SI unit, which may be that of the readings."""
+    if si_unit == reading.si:
+        return dimension_in("voltage", reading)
+    return next((name for name, units in DIMENSIONS.items() if units.si == si_unit), si_unit)
+
+
+def estimated_quantity(name: str, si_unit: str = "", reading: Reading = VOLTS) -> Quantity:
     """Return how an estimated parameter is shown; one that is not known keeps its name."""
     start, scan = name_and_scan(name)
     declared = ESTIMATED.get(start) or Quantity(name, "SI units", name.replace("_", " "))
@@ -270,16 +277,17 @@ def estimated_quantity(name: str, si_unit: str = "") -> Quantity:
         declared = replace(declared, name=name, words=f"{declared.words}, scan {scan}")
     if not si_unit:
         return declared
-    dimension = next((name for name, units in DIMENSIONS.items() if units.si == si_unit), si_unit)
+    dimension = dimension_with(si_unit, reading)
     return declared if dimension == declared.dimension else replace(declared, dimension=dimension)
 
 
 def parameter_quantity(parameters: ParameterSet, name: str) -> Quantity:
     """Return how one of a set's parameters is shown, by its stated unit where there is one."""
     declared = estimated_quantity(name)
-    if not parameters.units or parameters.reading != VOLTS:
-        return declared.read_in(parameters.reading)
-    return estimated_quantity(name, parameters.units[parameters.names.index(name)])
+    reading = parameters.reading
+    if not parameters.units or (reading != VOLTS and declared.dimension in DIMENSIONS):
+        return declared.read_in(reading)
+    return estimated_quantity(name, parameters.units[parameters.names.index(name)], reading)
 
 
 def measured_text(parameters: ParameterSet, name: str, coverage: float = 1.0) -> str:

@@ -13,6 +13,8 @@ COUNT = 40 if FULL else 8
 MEAN = 0.25e-3
 NOISE = 0.001
 X = line(step=MEAN)
+WIDENED = MEAN**2 / 24 / SIGMA**2
+"""What a mean that is not stated does to the width: in one direction s^2 grows by D^2/12."""
 _PER_MEAN = 16
 """Points of a mean, a midpoint rule that is right to 1e-5 of the signal."""
 
@@ -36,10 +38,10 @@ def errors(world, seed, *, stated):
 @pytest.mark.parametrize("world", [ROUND, tail(0.15)], ids=["Gaussian", "tails"])
 def test_a_stated_mean_widens_nothing(world):
     change = np.mean([errors(world, seed, stated=True) for seed in range(COUNT)], axis=0)
-    assert np.abs(change).max() < 2e-4
+    # Means weigh the tails of a G otherwise, which a Gaussian and a smooth G do not follow wholly.
+    assert np.abs(change).max() < WIDENED / 10
 
 
 def test_a_mean_that_is_not_stated_widens_the_sensor():
     change = errors(ROUND, 0, stated=False)
-    # In one direction s^2 grows by D^2/12.
-    assert change[1] == pytest.approx(MEAN**2 / 24 / SIGMA**2, abs=2e-3)
+    assert change[1] == pytest.approx(WIDENED, abs=2e-3)

@@ -282,9 +282,11 @@ def test_a_slow_sensor_is_calibrated_as_if_it_were_still(made, dynamics, speed):
 
 
 @pytest.mark.parametrize(
-    ("speed", "wrong"), [(1e-3, (0.0155, 0.032)), (FAST, (-0.0475, 0.003))], ids=["slow", "fast"]
+    ("speed", "wrong", "within"),
+    [(1e-3, (0.0155, 0.032), (0.02, 0.002)), (FAST, (-0.0475, 0.003), (0.002, 0.002))],
+    ids=["slow", "fast"],
 )
-def test_the_creep_of_a_dwell_record_corrects_a_calibration(speed, wrong, seed):
+def test_the_creep_of_a_dwell_record_corrects_a_calibration(speed, wrong, within, seed):
     rng = np.random.default_rng(seed)
     time = np.arange(1200) / 20
     u = 1 - 0.05 * np.exp(-time) + 0.002 * rng.standard_normal(time.size)
@@ -304,4 +306,5 @@ def test_the_creep_of_a_dwell_record_corrects_a_calibration(speed, wrong, seed):
     # Within 0.2 and 0.4 %, and four times the 0.09 and 0.06 % that the record's noise leaves.
     corrected = found(CREEP, creep=creep_of(record)) / true
     assert (np.abs(corrected - 1) < [0.0055, 0.0065]).all()
-    assert found(CREEP) / true - 1 == pytest.approx(wrong, abs=0.005)
+    # A is not told well from what creeps for as long as the scan: it scatters by 0.46 %.
+    assert (np.abs(found(CREEP) / true - 1 - wrong) < within).all()

@@ -35,7 +35,6 @@ from memscal.model.checks import (
     state_of_checks,
 )
 from memscal.model.instrument import Dynamics
-from memscal.model.notation import VOLTS
 from memscal.model.provenance import Process
 from memscal.model.records import PROCESS
 from memscal.model.result import Shown
@@ -160,7 +159,8 @@ def creep_of(record: Scan) -> Creep:
             ("share", "time", "level", "record"),
             np.append(found, length),
             np.pad(covariance, (0, 1)),
-            ("1", "s", record.unit, "s"),
+            ("1", "s", record.reading.si, "s"),
+            record.reading,
         ),
         checks=(
             added_check("one_time", added, _SEARCHED, _ONE_TIME),
@@ -218,9 +218,10 @@ def write_creep(creep: Creep, path: Path, *, overwrite: bool = False) -> None:
 
 def read_open(file: SafeFile) -> Creep:
     """Read the creep of an open memscal-creep file; refuse one that was changed."""
+    record = scan_from(file, schema=_SCHEMA)
     return Creep(
-        record=scan_from(file, schema=_SCHEMA),
-        parameters=groups.read_parameters(file, "/entry/parameters", VOLTS),
+        record=record,
+        parameters=groups.read_parameters(file, "/entry/parameters", record.reading),
         checks=groups.read_quality(file),
     )
 

@@ -7,6 +7,7 @@ from scipy.signal import lfilter
 
 import memscal
 from memscal.extensions.motion.creep import creep_of
+from memscal.model.quantities import measured_text
 from memscal.readings.noise_record import noise_of
 
 TIME = np.arange(1200) / 20
@@ -73,6 +74,9 @@ def test_a_record_without_creep_or_of_something_else_is_refused(stated, words):
 
 def test_a_scan_along_time_keeps_its_indenter_and_is_no_noise_record(run, table):
     path = table.with_name("dwell.h5")
+    small = creep_of(dwell(u_zz=1e-6 * dwell().u_zz, unit="A"))
+    # A unit of readings that were read before is not that of these.
+    assert measured_text(small.parameters, "level").endswith("nA")
     memscal.write_scan(dwell(unit="A"), path)
     read = memscal.read_scan(path)
     assert read.indenter == ROD
