@@ -75,7 +75,9 @@ def _draw_places(axes: Axes, array: SensorArray) -> None:
     if array.layout is not None:
         away = array.places - array.layout
         end = array.places + _LONGER * (away - np.nanmean(away, axis=0))
-        axes.plot([x, end[:, 0] / MM], [y, end[:, 1] / MM], color=GAUSSIAN)
+        # Where sensors are not where they should be, lines end at the panel's edge.
+        lines = [x, end[:, 0] / MM], [y, end[:, 1] / MM]
+        axes.plot(*lines, color=GAUSSIAN, scalex=False, scaley=False)
         axes.plot(*array.layout[~array.used].T / MM, "x", color=FAILED)
     for i in np.flatnonzero(array.used) if a.size <= _MOST_NUMBERS else ():
         number = f"{a[i]:.3g}"

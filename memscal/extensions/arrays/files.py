@@ -124,9 +124,11 @@ def read_open(file: SafeFile) -> ArrayData:
     told = np.isfinite(data.centres[data.used])
     kernel = np.fmax.reduce(data.kernels)
     numbers = np.vstack([data.k, kernel, data.modes.changes, read.get("reference", 0.0 * kernel)])
-    if not np.isfinite(numbers).all() or len(np.unique(told, axis=0)) != 1:
+    finite = np.isfinite(numbers).all()
+    if not finite or len(np.unique(told, axis=0)) != 1 or len(data.pairs) != len(read["of_c"]):
         raise FormatError(
-            f"{file.name} has kernels or centres that are not finite, or no sensor is used.",
+            f"{file.name} has kernels or centres that are not finite, no sensor that is used, or "
+            "not the pairs of which it states the crosstalk.",
             cure="Calibrate the array again.",
         )
     return data

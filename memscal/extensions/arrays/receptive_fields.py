@@ -90,9 +90,10 @@ class ReceptiveFields:
 
     def normal(self, places: FloatArray, force: FloatArray | float = 1.0) -> ArrayTriple:
         """Fields per newton without shear, and their derivatives by x and y, (m, n) each."""
-        sources = self._sources(places, force, np.zeros_like(places))
-        by_x, by_y, h = (sources[..., i] @ self.mixing.T for i in range(3))
-        return h, by_x, by_y
+        offsets = places[:, None] - self.centres
+        value, slope, _, _ = np.moveaxis(self._looked_up(offsets, force), -1, 0)
+        along_x, along_y = slope * np.moveaxis(offsets, -1, 0)
+        return value @ self.mixing.T, along_x @ self.mixing.T, along_y @ self.mixing.T
 
     def forward(self, places: FloatArray, force: FloatArray, shear: FloatArray) -> ArrayPair:
         """Readings (m, n), and their derivatives by x, y, force and the two shears, (m, n, 5)."""

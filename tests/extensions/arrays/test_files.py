@@ -94,13 +94,14 @@ def test_a_changed_file_is_refused_or_accepted_on_record(tmp_path):
         "kernel/reference",
         "sensors/centre_x",
         "sensors/used",
+        "crosstalk/estimated",
     ],
 )
 def test_an_altered_file_with_numbers_that_are_none_is_refused(path, tmp_path):
     file = tmp_path / "array.h5"
     full_array().save(file)
     with h5py.File(file, "a") as altered:
-        which = slice(None) if path == "sensors/used" else 0
+        which = slice(None) if path in ("sensors/used", "crosstalk/estimated") else 0
         altered[f"entry/{path}"][..., which] = np.nan
     with pytest.raises(FormatError, match="not finite"):
         memscal.load_array(file, accept_altered=True)
