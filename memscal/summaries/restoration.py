@@ -97,6 +97,7 @@ def _cells(restored: Restoration) -> dict[str, str]:
 def tables(restored: Restoration) -> list[Table]:
     """Return the numbers, the stress at a few radii, and the quality checks."""
     rows = [("load", f"{restored.scan.load:.4g} N")]
+    rows += [("direction of sliding", word) for word in restored.scan.directions]
     shown = _determined(restored)
     rows += [(shown[name].words, cell) for name, cell in _cells(restored).items()]
     resolved = restored.resolved_wavenumber / PER_MM

@@ -626,3 +626,9 @@ def test_one_direction_is_that_of_all_readings():
 def test_what_is_no_direction_is_refused(way, words):
     with pytest.raises(InputError, match=words):
         import_table({"U (mV)": [1], "t (s)": [0], "way": [way]}, **MOVED, sliding="way")
+
+
+def test_an_indenter_that_slides_is_not_held():
+    table = SLID | {"x (mm)": np.zeros(7), "t (s)": np.arange(7.0)}
+    with pytest.raises(InputError, match=r"slides \(--sliding\) is not held \(--holds\)"):
+        import_table(table, u="U", x="x", time="t", sliding="forth", layout=TableLayout(holds=True))

@@ -127,6 +127,8 @@ def test_each_load_and_direction_of_a_sliding_scan_is_a_profile():
         assert profile.tangential_load == pytest.approx(mean, rel=0.01)
     back = memscal.restore(scan, SENSOR, load=LOADS[0], direction="back")
     assert back.force == pytest.approx(profiles[2].force, rel=1e-3)
+    rows = str(back.summary()).splitlines()
+    assert "direction of sliding back" in [" ".join(row.split()) for row in rows]
     with pytest.raises(InputError, match="slid forth and back, and no direction is chosen"):
         memscal.restore(scan, SENSOR, load=LOADS[0])
     with pytest.raises(InputError, match="no stated direction, and back is chosen"):

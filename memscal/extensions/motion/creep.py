@@ -124,8 +124,8 @@ def creep_of(record: Scan) -> Creep:
     InputError
         If it is no dwell record.
     FitError
-        If no creep is seen (the share that would have been seen is said), or one of a time that
-        the record does not tell.
+        If no creep is seen (the share that would have been seen is said), one of a time that the
+        record does not tell, or a reading that falls.
 
     Examples
     --------
@@ -148,6 +148,13 @@ def creep_of(record: Scan) -> Creep:
             cure="Calibrate without it; or begin the record at the contact, and record for longer.",
         )
     found, covariance = curve_fit(dwell_readings, time, u, (0.1, tau, u[-1]))
+    if found[0] < 0:
+        raise FitError(
+            f"{place_of(record)}: the readings fall, by a share of {100 * -found[0]:.2g} % with a "
+            f"time of {found[1]:.2g} s.",
+            why="The creep of a sensor lets them rise, to what the load makes of them.",
+            cure="Hold the load in place of the depth: a film relaxes; and look for drift.",
+        )
     left = u - dwell_readings(time, *found)
     decay = np.exp(-time / found[1])
     added, _ = _further(time, u, decay, time * decay)

@@ -212,6 +212,11 @@ def import_table(
         columns["repeat"] = _lines(columns, numbering, notes)
     holds = None
     if layout.holds:
+        if "sliding_direction" in columns:
+            raise InputError(
+                "An indenter that slides (--sliding) is not held (--holds).",
+                cure="Give one of both.",
+            )
         deep = columns.pop("depth", None)
         anew = bool(layout.baseline)
         holds = find_holds(columns, table.all_lines(), reading, depth=deep, baseline=anew)

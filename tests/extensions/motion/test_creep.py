@@ -62,6 +62,7 @@ def test_noise_that_is_not_white_is_said():
             r"no creep seen; a share of 1\.\d % with a time of 0.6 s",
         ),
         ({"times": (500.0,)}, "no creep seen"),
+        ({"shares": (-0.05,), "noise": 1e-5}, "the readings fall, by a share of 5 % with a time of 1 s"),
         ({"indenter": None}, "is no dwell record"),
         ({"u_zz": np.ones(TIME.size)}, "all are equal"),
         ({"u_zz": np.where(TIME < 3, TIME, np.nan)}, "fewer than 64"),
