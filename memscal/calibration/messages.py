@@ -70,6 +70,8 @@ def calibration_messages(
     clipped = round(sum(scan.at_ceiling for scan in prepared.as_stated))
     if clipped:
         yield Message("at_ceiling", quality.at_ceiling_text(clipped))
+    if prepared.request.creep:
+        yield Message("creep", f"Creep is corrected for by {prepared.request.creep}.")
     yield from point_messages(estimate)
     for scan in prepared.as_stated:
         yield from record_messages(scan)

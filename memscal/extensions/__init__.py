@@ -140,6 +140,7 @@ HOOKS = {
     "accepted_differences": "formats.opened",
     "table_of": "summaries.table",
     "sweep_noise": "extensions.monte_carlo.sweep",
+    "sliding_speed": "extensions.motion.velocities",
     "velocities": "extensions.motion.velocities",
     "with_creep": "extensions.motion.creep",
     "with_drawn_in": "extensions.meshes.mesh_files",

@@ -271,12 +271,13 @@ def compare(
     measured = _measured(opened, sensor, override)
     setting = _setting(measured, cache, workers)
     if sensor.order or sliding:
-        others = (references, lubricated, shear, macroscopic, friction if sliding else None)
+        slides = friction if sliding else None
+        others = (references, lubricated, shear, macroscopic, interface or None, slides)
         if any(option is not None for option in others):
             raise InputError(
                 "A tangential channel, or sliding, is compared with options of the normal one.",
-                cure="Leave out references, lubricated, shear and macroscopic (for sliding, "
-                "friction, too), or give the artifact of zz and scans of contacts at rest.",
+                cure="Leave out references, lubricated, shear, macroscopic, interface and, for "
+                "sliding, friction; or give the artifact of zz and scans of contacts at rest.",
             )
     if sliding:
         slid: FrictionComparison = hook("compare_sliding")(

@@ -181,6 +181,14 @@ def random_uncertainty(budget: Mapping[str, float]) -> float:
     return math.hypot(*(u for source, u in budget.items() if source not in _SYSTEMATIC))
 
 
+def unexplained(
+    estimate: BoundedEstimate, reason: str = "No friction coefficient explains these profiles."
+) -> BoundedEstimate:
+    """Return what is left of a coefficient that does not explain what it should."""
+    nothing = Interval(math.nan, math.nan)
+    return replace(estimate, value=None, standard_uncertainty=None, interval=nothing, reason=reason)
+
+
 def with_loading(by_loading: ByLoading, *, tested: bool) -> dict[str, BoundedEstimate]:
     """Take the middle of both loadings; a rectangle between them, width / sqrt(12), is left.
 
@@ -188,16 +196,7 @@ def with_loading(by_loading: ByLoading, *, tested: bool) -> dict[str, BoundedEst
     """
     estimates = by_loading.values()
     if tested and max(estimate.p_value for estimate in estimates) < FALSE_ALARM:
-        return {
-            loading: replace(
-                estimate,
-                value=None,
-                standard_uncertainty=None,
-                interval=Interval(math.nan, math.nan),
-                reason="No friction coefficient explains these profiles.",
-            )
-            for loading, estimate in by_loading.items()
-        }
+        return {loading: unexplained(estimate) for loading, estimate in by_loading.items()}
     values = [estimate.value for estimate in estimates if estimate.value is not None]
     if len(values) < 2:
         return dict(by_loading)

@@ -320,7 +320,7 @@ def measured_scan(scan: Scan) -> MeasuredScan:
         width=_width(scan),
         lubrication=scan.lubrication,
         motion=scan.motion,
-        speed=_speed(scan),
+        speed=hook("sliding_speed")(scan) if scan.motion == "sliding" else scan.speed,
         sliding_friction=scan.sliding_friction,
         sliding_friction_uncertainty=scan.sliding_friction_uncertainty,
         position_scale_uncertainty=scan.position_scale_uncertainty,
@@ -330,13 +330,6 @@ def measured_scan(scan: Scan) -> MeasuredScan:
         source=scan.source,
         unit="" if scan.unit == "V" else scan.unit,
     )
-
-
-def _speed(scan: Scan) -> float | None:
-    """Speed of an indenter, in m/s: as stated, or of one that slid by the times, to two digits."""
-    if scan.speed or scan.time is None or scan.motion != "sliding":
-        return scan.speed
-    return float(f"{np.median(np.abs(hook('velocities')(scan))):.2g}")
 
 
 def measured_profile(

@@ -317,8 +317,9 @@ def _symmetry(restored: Restoration) -> QualityCheck:
     else:
         name = "symmetry"
         uneven = symmetry_test(estimate)
+        slid = "the friction of sliding, " if restored.scan.motion == "sliding" else ""
         meaning = (
-            "odd columns. A failure means that the left and right halves differ: a tilted "
+            f"odd columns. A failure means that the left and right halves differ: {slid}a tilted "
             "indenter, an uneven film, or a drifting load."
         )
     return added_check(

@@ -76,7 +76,7 @@ residual_correlation: correlation of neighbouring residuals
 gaussian_evidence: logarithm of the Bayes factor for a departure of G from a Gaussian
     as gaussian_misfit
 symmetry: difference of left and right (lines); even part of a shear
-    look for a tilted rod, uneven film, drifting load or lag
+    look for a tilted rod, uneven film, drifting load, lag or sliding
 axisymmetry: ellipticity of the sensor or of the contact (rasters)
     it is not round; of a calibration G(r) is a mean over directions
 load_linearity: change of A with the load (several loads)
@@ -111,6 +111,10 @@ joint_chi_square: all loads of a kind against one friction coefficient, chi-squa
     friction changes with the load: see each coefficient, or --interface
 lubricated_frictionless: lubricated loads against no friction: rise of -2 ln p
     more friction than counted, or a wrong A, load or thickness: doubt the dry ones
+negative_friction: sliding friction below zero, in u
+    check direction, sign of positions, backlash, low-pass
+skew_and_shift: sliding friction by skew and shift against that by skew alone, in u
+    state a larger backlash, or a low-pass
 tangential_load: sliding friction against the tangential load over the load, in u
     check both load cells, direction, film and thickness
 sliding_friction: sliding friction against the stated one, in u

@@ -16,8 +16,8 @@ _TOGETHER = {
     "creep_time": "creep_share",
     "creep_record": "creep_share",
 }
-#: The share of the final reading that creeps is below one.
-_MOST_CREEP = 0.99
+MOST_CREEP = 0.99
+"""The share of the final reading that creeps is below one."""
 
 
 @keyword_value_record
@@ -77,7 +77,7 @@ class Dynamics:
                         f"The dynamics of the sensor state {name}, but no {needed}.",
                         cure=f"Give {needed}, or leave out {name}.",
                     )
-        require_range("creep_share of the sensor", self.creep_share or 0.0, 0.0, _MOST_CREEP)
+        require_range("creep_share of the sensor", self.creep_share or 0.0, 0.0, MOST_CREEP)
 
 
 @keyword_value_record

@@ -583,8 +583,8 @@ class Scan:
             return self
         if direction not in held:
             raise InputError(
-                f"The indenter slid {' and '.join(held) or 'in no stated direction'}, and "
-                f"{direction or 'no direction'} is chosen.",
+                f"The indenter {'slid ' if held else 'has no direction of sliding'}"
+                f"{' and '.join(held)}, and {direction or 'no direction'} is chosen.",
                 why="Forth the stress under it is not that of the way back.",
                 cure="Choose one of those of the scan: direction='forth' or 'back' (--direction).",
             )

@@ -115,6 +115,8 @@ def verdict(checks: Sequence[QualityCheck]) -> str:
     """Return as a sentence how many checks passed, and the kinds of those that failed."""
     failed = [check.kind.replace("_", " ") for check in checks if not check.passed]
     if not failed:
+        if len(checks) == 1:
+            return "The check passed."
         return f"All {len(checks)} checks passed." if checks else ""
     kinds = [*dict.fromkeys(failed)]
     named = f"{', '.join(kinds[:_NAMED])}{', and others' if len(kinds) > _NAMED else ''}"

@@ -13,6 +13,7 @@ from helpers.tables import imported
 from memscal import Rod, Scan, Sphere, TableLayout, import_table
 from memscal.errors import FormatError, InputError, UnitWarning
 from memscal.formats.tables.reference import read_reference_table
+from memscal.formats.tables.stated import ScanConditions
 from memscal.formats.tables.text_table import read_indenter_table
 from memscal.model.checks import marked_texts
 
@@ -621,14 +622,36 @@ def test_one_direction_is_that_of_all_readings():
 
 
 @pytest.mark.parametrize(
-    ("way", "words"), [(0, "directions of sliding"), ("up", "none of forth, back")]
+    ("way", "words"), [(2, "has the direction 2"), ("up", "none of forth, back")]
 )
 def test_what_is_no_direction_is_refused(way, words):
     with pytest.raises(InputError, match=words):
         import_table({"U (mV)": [1], "t (s)": [0], "way": [way]}, **MOVED, sliding="way")
 
 
-def test_an_indenter_that_slides_is_not_held():
-    table = SLID | {"x (mm)": np.zeros(7), "t (s)": np.arange(7.0)}
-    with pytest.raises(InputError, match=r"slides \(--sliding\) is not held \(--holds\)"):
-        import_table(table, u="U", x="x", time="t", sliding="forth", layout=TableLayout(holds=True))
+def test_rows_at_rest_are_left_out_of_a_sliding_log():
+    ways = [1, 1, 1, 0, -1, -1, -1]
+    scan = import_table({**SLID, "way": ways, "t (s)": np.arange(7.0)}, **MOVED, sliding="way")
+    assert scan.sliding_direction.tolist() == [[1, 1, 1], [-1, -1, -1]]
+    assert "no position or direction: row 4" in str(scan.notes)
+
+
+@pytest.mark.parametrize(
+    ("stated", "message"),
+    [
+        ({"sliding": "forth", "layout": TableLayout(holds=True)}, r"slides .* is not held"),
+        ({"sliding": "forth", "conditions": ScanConditions(dwell_time=1.0)}, "is not held"),
+        ({"tangential_load": "Q"}, "belongs to an indenter that slides"),
+        ({"sliding": "way", "time": "t"}, "not in the order of time"),
+    ],
+)
+def test_what_does_not_go_with_sliding_is_refused(stated, message):
+    table = {
+        "U (mV)": np.arange(4.0),
+        "x (mm)": np.arange(4.0),
+        "Q (N)": np.ones(4),
+        "way": [1, -1, 1, -1],
+        "t (s)": [0, 3, 1, 2],
+    }
+    with pytest.raises(InputError, match=message):
+        import_table(table, u="U", x="x", **stated)

@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -24,7 +25,13 @@ from memscal.apparatus import ApparatusFunction
 from memscal.errors import InputError
 from memscal.extensions.motion.sliding_family import SLIDING, LineNodes, sliding_family
 from memscal.friction.checks import comparison_messages, reduced_check
-from memscal.friction.effective import EXPANDED, FrictionFit, fit_friction, with_loading
+from memscal.friction.effective import (
+    EXPANDED,
+    FrictionFit,
+    fit_friction,
+    unexplained,
+    with_loading,
+)
 from memscal.friction.family import ProfileFamily
 from memscal.friction.likelihood import (
     Channel,
@@ -39,6 +46,7 @@ from memscal.friction.likelihood import (
     standardise,
 )
 from memscal.friction.results import BoundedEstimate, FrictionComparison
+from memscal.measurement.restore import noise_unstated_message
 from memscal.model.arrays import (
     ArrayPair,
     FloatArray,
@@ -46,13 +54,16 @@ from memscal.model.arrays import (
     floats,
     keyword_array_record,
 )
-from memscal.model.checks import FAILED_CHECK, QualityCheck, check
+from memscal.model.checks import FAILED_CHECK, NOISE_UNSTATED, QualityCheck, check
 from memscal.model.measured_stress import MeasuredProfile, MeasuredStress
 
 #: Loads that differ by less than this share are one.
 _SAME_LOAD = 0.05
 #: Standard deviation of a centre that is not known, in m.
 _ANYWHERE = 0.1
+#: Standard uncertainties by which two coefficients differ.
+_APART = 3.0
+_DIFFER = "The friction differs between the speeds."
 
 
 @keyword_array_record
@@ -139,10 +150,10 @@ def _best_places(
 class SlidingComparison(FrictionComparison):
     """Measured stress against contacts that slide, with the friction that explains it.
 
-    ``joint`` is of all passes of a lubrication together, ``by_shear`` of those of the load and
-    speed of each measured profile, and ``speeds`` by lubrication and speed (m/s), where there are
-    several.  ``curves`` (3, n) of each profile: position in m, measured and calculated stress as
-    the sensor blurs it, in Pa.
+    ``joint`` is of all passes of a lubrication together, unless it differs between speeds,
+    ``by_shear`` of each measured profile by its skew, and ``speeds`` by lubrication and speed
+    (m/s), where there are several.  ``curves`` (3, n) of each profile: position in m, measured and
+    calculated stress as the sensor blurs it, in Pa.
     """
 
     speeds: Mapping[tuple[str, float], BoundedEstimate]
@@ -159,36 +170,61 @@ def compare_sliding(
 ) -> SlidingComparison:
     """Hold measured stress against sliding contacts; ``setting``: that of a family."""
     # What a restoration's checks test is a round stress.
-    others = tuple(each for each in measured.messages if each.kind != FAILED_CHECK)
-    measured = replace(measured, checks=(), process=replace(measured.process, messages=others))
+    of_round = (FAILED_CHECK, NOISE_UNSTATED)
+    others = [each for each in measured.messages if each.kind not in of_round]
     profiles = measured.profiles
     loads = np.sort(measured.loads)
     larger = loads[1:][np.diff(loads) > _SAME_LOAD * loads[:-1]]
     numbers = np.searchsorted(larger, measured.loads, "right").tolist()
-    states = [profile.lubrication for profile in profiles]
     speeds = [(profile.lubrication, profile.scan.speed) for profile in profiles]
     keys = [*zip(speeds, numbers, strict=True)]
 
     family = sliding_family(setting)
     sensor = sensor_of(apparatus, family, setting["reach"], measured.scans)
-    sharing = indicators(range(len(keys)) if backlash is None else keys)
+    if backlash is not None and max(np.bincount(indicators(keys).argmax(axis=1))) == 1:
+        raise InputError(
+            "A backlash is given, and no load and speed has passes forth and back.",
+            cure="Leave it out (--backlash).",
+        )
+    own = indicators(range(len(keys)))
+    sharing = own if backlash is None else indicators(keys)
     points = _points(profiles, sharing, between_scan_gain, backlash or 0.0)
     at_loads = family.only(np.searchsorted(family.loads, measured.loads).tolist())
-    fit = fit_friction(SlidingChannel(points, sensor, at_loads))
+    channel = SlidingChannel(points, sensor, at_loads)
+    fit = fit_friction(channel)
     tested = measured.noise_stated
-    joint = {state: {SLIDING: found} for state, found in _by(states, fit, tested).items()}
-    each = _by(keys, fit, tested)
-    by_speed = _by(speeds, fit, tested)
-    stated = {(state, speed): by_speed[state, speed] for state, speed in by_speed if speed}
-    checks: list[QualityCheck] = []
+    if not tested:
+        # Readings scatter by more than their noise about a round stress.
+        found = _by(keys, fit)
+        left = [math.sqrt(found[key].least / found[key].degrees) for key in keys]
+        points = [replace(p, noise=size * p.noise) for p, size in zip(points, left, strict=True)]
+        channel = replace(channel, points=points)
+        fit = fit_friction(channel)
+        least = min(each.noise.min() for each in points)
+        others.append(noise_unstated_message(measured.scans[0].reading.text(least)))
+    process = replace(measured.process, messages=tuple(others))
+    measured = replace(measured, checks=(), process=process)
+    by_speed = _by(speeds, fit)
+    checks = [*_directions(speeds, fit)]
     if tested:
         checks += _misfits(by_speed.values())
+    if backlash is not None:
+        apart = [replace(p, sharing=row) for p, row in zip(points, own, strict=True)]
+        alone = _by(speeds, fit_friction(replace(channel, points=apart)))
+        checks += _shifts(by_speed, alone)
+    each = _by(keys, fit)
     checks += _agreements(profiles, [each[key] for key in keys])
+    joint = {}
+    for state, estimate in _told(_by([p.lubrication for p in profiles], fit), tested).items():
+        of_state = [found for (of, _), found in by_speed.items() if of == state]
+        joint[state] = {SLIDING: estimate if _agree(of_state) else unexplained(estimate, _DIFFER)}
+    by_pass = _told(_by(range(len(keys)), fit), tested)
+    stated = {key: found for key, found in _told(by_speed, tested).items() if key[1]}
     return SlidingComparison(
         measured=measured,
         friction=family.values,
         loads={},
-        by_shear={SLIDING: tuple(each[key] for key in keys)},
+        by_shear={SLIDING: tuple(by_pass.values())},
         joint=joint,
         checks=tuple(checks),
         messages=comparison_messages(measured, {SLIDING: family}, joint, tuple(checks)),
@@ -198,15 +234,35 @@ def compare_sliding(
     )
 
 
-def _by(keys: Sequence[Any], fit: FrictionFit, tested: bool) -> dict[Any, BoundedEstimate]:
-    """Return the coefficient of the passes of each key."""
+def _groups(keys: Sequence[Any]) -> dict[Any, list[int]]:
+    """Return which of the keys are alike."""
     groups: dict[Any, list[int]] = {}
     for i, key in enumerate(keys):
         groups.setdefault(key, []).append(i)
-    found = {}
-    for key, chosen in groups.items():
-        (found[key],) = with_loading({SLIDING: fit.coefficient(chosen)}, tested=tested).values()
-    return found
+    return groups
+
+
+def _by(keys: Sequence[Any], fit: FrictionFit) -> dict[Any, BoundedEstimate]:
+    """Return the coefficient of the passes of each key."""
+    return {key: fit.coefficient(chosen) for key, chosen in _groups(keys).items()}
+
+
+def _told(found: Mapping[Any, BoundedEstimate], tested: bool) -> dict[Any, BoundedEstimate]:
+    """Return coefficients; of what none explains nothing but the reason."""
+    return {key: with_loading({SLIDING: e}, tested=tested)[SLIDING] for key, e in found.items()}
+
+
+def _uncertainty(found: BoundedEstimate) -> float:
+    """Return the standard uncertainty of a coefficient, which may be at the end of its range."""
+    return max(found.interval.upper - found.best, found.best - found.interval.low) / EXPANDED
+
+
+def _agree(estimates: Sequence[BoundedEstimate]) -> bool:
+    """Whether coefficients differ by no more than their uncertainties make of them."""
+    return all(
+        abs(one.best - other.best) <= _APART * math.hypot(_uncertainty(one), _uncertainty(other))
+        for one, other in combinations(estimates, 2)
+    )
 
 
 def _points(
@@ -269,6 +325,44 @@ def _misfits(by_speed: Iterable[BoundedEstimate]) -> Iterator[QualityCheck]:
         )
 
 
+def _directions(keys: Sequence[Any], fit: FrictionFit) -> Iterator[QualityCheck]:
+    """Yield the checks that the friction of the passes of each key is not below zero."""
+    for i, chosen in enumerate(_groups(keys).values(), start=1):
+        along = fit.whole.only(chosen)
+        (step, *_), (rise, *_) = np.diff(along.coordinates), np.diff(along.deviance)
+        information = along.slope_fit()[0][0]
+        # A parabola by its first values and its curvature.
+        below = (rise / step - information * step) / (2 * math.sqrt(information))
+        yield check(
+            f"negative_friction_{i}",
+            max(below, 0.0),
+            _APART,
+            "How far the friction that explains the passes of a speed best would be below zero, "
+            "in its standard uncertainty. A failure means that the direction of sliding or of the "
+            "positions is not as stated, that the backlash is larger, or that the sensor lags.",
+            math.erfc(max(below, 0.0) / math.sqrt(2)) / 2,
+        )
+
+
+def _shifts(
+    found: Mapping[Any, BoundedEstimate], alone: Mapping[Any, BoundedEstimate]
+) -> Iterator[QualityCheck]:
+    """Yield the checks of coefficients by shift and skew against those by the skew alone."""
+    for i, (key, both) in enumerate(found.items(), start=1):
+        by_skew = alone[key]
+        u = _uncertainty(by_skew)
+        off = abs(by_skew.best - both.best) / u
+        yield check(
+            f"skew_and_shift_{i}",
+            off,
+            _APART,
+            f"Difference of the friction by the skew alone, {by_skew.best:.3g}, from that by skew "
+            f"and shift, {both.best:.3g}, in its standard uncertainty of {u:.2g}. A failure means "
+            "that the backlash is larger than stated, or that the sensor lags.",
+            math.erfc(off / math.sqrt(2)),
+        )
+
+
 def _agreements(
     profiles: Sequence[MeasuredProfile], frictions: Sequence[BoundedEstimate]
 ) -> Iterator[QualityCheck]:
@@ -282,16 +376,15 @@ def _agreements(
                 ratio,
                 ratio * (profile.load_uncertainty or 0.0) / profile.load,
             )
-        spread = (found.interval.upper - found.interval.low) / (2 * EXPANDED)
         for name, (value, u_value) in known.items():
             if value is None:
                 continue
-            u = math.hypot(spread, u_value or 0.0)
+            u = math.hypot(_uncertainty(found), u_value or 0.0)
             off = abs(found.best - value) / u
             yield check(
                 f"{name}_{i}",
                 off,
-                3.0,
+                _APART,
                 f"Difference of the sliding friction at {profile.label}, {found.best:.3g}, from "
                 f"{value:.3g}, in its standard uncertainty of {u:.2g}. A failure means that a load "
                 "cell, the film or the direction is not as stated, or that the shear is not in "

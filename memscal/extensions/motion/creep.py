@@ -34,7 +34,7 @@ from memscal.model.checks import (
     chi_square_limit,
     state_of_checks,
 )
-from memscal.model.instrument import Dynamics
+from memscal.model.instrument import MOST_CREEP, Dynamics
 from memscal.model.provenance import Process
 from memscal.model.records import PROCESS
 from memscal.model.result import Shown
@@ -125,7 +125,7 @@ def creep_of(record: Scan) -> Creep:
         If it is no dwell record.
     FitError
         If no creep is seen (the share that would have been seen is said), one of a time that the
-        record does not tell, or a reading that falls.
+        record does not tell, or a share that no sensor has.
 
     Examples
     --------
@@ -137,6 +137,12 @@ def creep_of(record: Scan) -> Creep:
     length = time[-1]
     fall, tau = _further(time, u)
     least = chi_square_limit(_SEARCHED)
+    if fall >= least and tau >= length:
+        raise FitError(
+            f"{place_of(record)}: the creep takes {length:.3g} s or longer, the whole record.",
+            why="Its share and its time are told by how it comes to an end.",
+            cure="Record for several times as long.",
+        )
     if fall < least or not length / u.size < tau < length:
         short = _SHORT * length
         spread = np.std(np.exp(-time / short)) * u.size**0.5
@@ -148,12 +154,13 @@ def creep_of(record: Scan) -> Creep:
             cure="Calibrate without it; or begin the record at the contact, and record for longer.",
         )
     found, covariance = curve_fit(dwell_readings, time, u, (0.1, tau, u[-1]))
-    if found[0] < 0:
+    if not 0 < found[0] < MOST_CREEP:
         raise FitError(
-            f"{place_of(record)}: the readings fall, by a share of {100 * -found[0]:.2g} % with a "
-            f"time of {found[1]:.2g} s.",
-            why="The creep of a sensor lets them rise, to what the load makes of them.",
-            cure="Hold the load in place of the depth: a film relaxes; and look for drift.",
+            f"{place_of(record)}: the share that comes late is {100 * found[0]:.2g} %, with a time "
+            f"of {found[1]:.2g} s.",
+            why="The creep of a sensor is a small part of its reading, which grows.",
+            cure="Begin the record at the contact. Readings that fall are of a film that relaxes, "
+            "under a held depth in place of a load, or of a drift.",
         )
     left = u - dwell_readings(time, *found)
     decay = np.exp(-time / found[1])

@@ -17,7 +17,8 @@ def creep_figure(creep: Creep) -> Figure:
     with panels_of(4.0, 2, sharex=True) as (figure, [above, below]):
         above.plot(time, record.u_zz / scale, ".", color=MEASURED, ms=2, label="record")
         above.plot(time, found / scale, color=GAUSSIAN, label="creep of one time")
-        above.set(ylabel=f"reading ({record.reading.unit})", xscale="log")
+        above.set(ylabel=f"reading ({record.reading.unit})")
+        above.set_xscale("symlog", linthresh=time[time > 0][0])
         legend_above(above)
         draw_residual_band(below)
         below.plot(time, left / left.std(), ".", color=MEASURED, ms=2)

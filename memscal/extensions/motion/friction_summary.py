@@ -17,7 +17,7 @@ _UM = 1e-6
 def _speeds(comparison: SlidingComparison) -> list[tuple[str, str, str]]:
     """Return speed, lubrication and friction in words."""
     return [
-        (f"{speed / MM:.4g} mm/s", state or "not stated", str(found))
+        (f"{speed / MM:.4g} mm/s", state, str(found))
         for (state, speed), found in comparison.speeds.items()
     ]
 
@@ -26,7 +26,10 @@ def answer(comparison: SlidingComparison) -> str:
     """Return the coefficient of all passes, or of each speed, and how the checks stand."""
     if not comparison.speeds:
         return comparisons.answer(comparison)
-    lines = [f"At {speed} ({state}): μ = {found}." for speed, state, found in _speeds(comparison)]
+    lines = [
+        f"At {speed}{', ' if state else ''}{state}: μ = {found}."
+        for speed, state, found in _speeds(comparison)
+    ]
     return "\n".join([*lines, verdict(comparison.checks)])
 
 

@@ -39,6 +39,8 @@ from memscal.parallel import single_threaded
 #: Cells across the window, until the base stress changes by less than this share of its peak.
 _CELLS = (32, 64, 128, 256, 512)
 _CHANGE = 5e-4
+_FEWEST = 8
+_MOST_FRICTION = 5.0
 #: A smaller contact, in thicknesses, is that of a half-space.
 _LEAST_RADIUS = 0.05
 #: The window is so much wider than the contact from which it starts, or that it cuts off.
@@ -75,7 +77,7 @@ def slide(
     load : float
         Normal load in N.
     friction : float
-        Shear over pressure :math:`\mu`, from 0 upward.
+        Shear over pressure :math:`\mu`, from 0 to 5.
     direction : float
         +1 where the indenter moves to larger x on the film, -1 to smaller.
     points : int, optional
@@ -113,11 +115,13 @@ def slide(
             "over the edge depends on how sharp that is.",
             cure="Give a Sphere, Cone or Profile.",
         )
-    if not 0 <= friction < np.inf or abs(direction) != 1:
+    if not 0 <= friction <= _MOST_FRICTION or abs(direction) != 1:
         raise InputError(
             f"The friction is {friction:g}, and the direction {direction:g}.",
-            cure="Give shear over pressure, from 0 upward, and +1 or -1.",
+            cure=f"Give shear over pressure, from 0 to {_MOST_FRICTION:g}, and +1 or -1.",
         )
+    if points is not None and (points < _FEWEST or points % 1):
+        raise InputError(f"{points:g} points are asked for.", cure=f"Give {_FEWEST} or more.")
     radius = indent(film, indenter, load=load, strain="linear").contact_radius
     if radius < _LEAST_RADIUS * film.thickness:
         raise DomainError(

@@ -4,6 +4,7 @@ import numpy as np
 
 from memscal.errors import InputError
 from memscal.estimation.points import grouped
+from memscal.measurement.restore import place_of
 from memscal.model.arrays import FloatArray
 from memscal.model.scan import Scan
 
@@ -12,6 +13,9 @@ _AROUND = 5
 _SHARE = 0.025
 #: Of the ways between readings, what moves on is at least this share; a random order has less.
 _ONWARDS = 0.5
+#: Share of the way that may be against the stated direction, and ratio of speeds that are one.
+_AGAINST = 0.1
+_ALIKE = 1.5
 
 
 def velocities(scan: Scan) -> FloatArray:
@@ -40,6 +44,34 @@ def velocities(scan: Scan) -> FloatArray:
         rows = line == number
         velocity[rows] = _slopes(along[rows], clock[rows])
     return speed * np.sign(velocity) if speed else velocity
+
+
+def sliding_speed(scan: Scan) -> float | None:
+    """Return the speed of an indenter that slid, in m/s: as stated, or by the times to two digits.
+
+    Refuse passes of several speeds, and directions against the times.
+    """
+    if scan.time is None or scan.dwell_time or not np.isfinite(scan.time).any():
+        return scan.speed
+    velocity = velocities(scan)
+    if scan.sliding_direction is not None:
+        forth = velocity * scan.sliding_direction
+        if -forth.sum(where=forth < 0) > _AGAINST * np.abs(forth).sum():
+            raise InputError(
+                f"{place_of(scan)}: in time the indenter moves against its direction of sliding.",
+                why="Forth is to larger positions, back to smaller ones.",
+                cure="Correct the directions (--sliding), or the sign of the positions.",
+            )
+    passes = np.broadcast_to(scan.passes, velocity.shape)
+    each = [float(np.median(np.abs(velocity[passes == i]))) for i in np.unique(passes)]
+    if max(each) > _ALIKE * min(each):
+        low, high = (f"{1e3 * speed:.2g}" for speed in (min(each), max(each)))
+        raise InputError(
+            f"{place_of(scan)}: the indenter slid at {low} to {high} mm/s.",
+            why="Friction depends on the speed, and passes of one file are taken as alike.",
+            cure="Give the passes of each speed a file of their own.",
+        )
+    return scan.speed or float(f"{np.median(np.abs(velocity)):.2g}")
 
 
 def _slopes(x: FloatArray, time: FloatArray) -> FloatArray:

@@ -202,7 +202,7 @@ def import_table(
     if len(readings) > 1 or "*" in str(u):
         named |= hook("columns_of_array")(table, readings, named)
     array = any(" of " in name for name in named)
-    _require_use(named, layout, conditions, uncertainties)
+    _require_use(named, layout, conditions, uncertainties, slid=sliding is not None)
     wanted, reading = _wanted(table, named, layout)
     columns, notes = _read_columns(table, wanted, layout.u_sign, uncertainties.noise, str(sliding))
     if array:
@@ -212,11 +212,6 @@ def import_table(
         columns["repeat"] = _lines(columns, numbering, notes)
     holds = None
     if layout.holds:
-        if "sliding_direction" in columns:
-            raise InputError(
-                "An indenter that slides (--sliding) is not held (--holds).",
-                cure="Give one of both.",
-            )
         deep = columns.pop("depth", None)
         anew = bool(layout.baseline)
         holds = find_holds(columns, table.all_lines(), reading, depth=deep, baseline=anew)
@@ -292,8 +287,12 @@ def _require_use(
     layout: TableLayout,
     conditions: ScanConditions,
     uncertainties: ScanUncertainties,
+    *,
+    slid: bool,
 ) -> None:
     """Refuse what has no use: a unit or an uncertainty of nothing, or two of the same."""
+    dragged = named["tangential_load"] is not None or conditions.sliding_friction is not None
+    held = layout.holds or conditions.dwell_time is not None or conditions.motion == "rest"
     no_load = conditions.load is None and named["normal_load"] is None
     given = (uncertainties.noise is not None, named["u_zz_errors"] is not None, layout.holds)
     for useless, problem, cure in (
@@ -321,6 +320,16 @@ def _require_use(
             not layout.holds and (named["depth"] is not None or layout.baseline),
             "depth (--depth) and baseline (--baseline) belong to a log with holds.",
             "State holds (--holds), too.",
+        ),
+        (
+            dragged and not slid,
+            "A tangential load or a sliding friction belongs to an indenter that slides.",
+            "State its direction (--sliding), too.",
+        ),
+        (
+            held and slid,
+            "An indenter that slides (--sliding) is not held (--holds, --dwell, --noise-record).",
+            "Give one of both.",
         ),
         (
             layout.depth_unit and named["depth"] is None,
@@ -401,6 +410,16 @@ def _read_columns(
         columns["u_zz_errors"] = np.full(columns["u_zz"].shape, in_si)
     if sliding in DIRECTIONS:
         columns["sliding_direction"] = np.full(columns["u_zz"].shape, DIRECTIONS[sliding])
+    elif "sliding_direction" in columns:
+        ways = columns["sliding_direction"]
+        ways[ways == 0] = np.nan  # at rest
+        strange = np.unique(ways[abs(ways) != 1])[:1]
+        if np.isfinite(strange).any():
+            raise InputError(
+                f"{table.where(wanted['sliding_direction'].column)} has the direction "
+                f"{strange[0]:g}.",
+                cure="Write forth or 1 to larger positions, back or -1 to smaller, and 0 at rest.",
+            )
     if "branch" in columns:
         where = table.where(wanted["branch"].column)
         columns["branch"] = branch_numbers(where, np.nan_to_num(columns["branch"]))
@@ -451,6 +470,11 @@ def _scan_of(
         # Where the indenter turns a pass begins, if no column numbers them.
         turns = np.diff(columns["sliding_direction"]) != 0
         if turns.any() and "repeat" not in columns:
+            if np.fmin.reduce(np.diff(columns.get("time", [])), initial=0.0) < 0:
+                raise InputError(
+                    "The rows are not in the order of time, and the indenter turns between them.",
+                    cure="Sort the table by time, or name what numbers the passes (--repeat).",
+                )
             columns["repeat"] = np.append(0, np.cumsum(turns))
     loads_in_words = _numbered_by_load(columns, notes)
     stated["load"] = _nominal_load(columns.get("normal_load"), conditions.load, notes)
@@ -591,7 +615,8 @@ def _placed(columns: Columns, notes: list[str], name_rows: Callable[[Any], str])
             notes.append(f"{name} is missing (NaN) in {name_rows(rows)}.")
     if not finite.all():
         rows = np.flatnonzero(~finite)
-        notes.append(f"Left out, for they have no position: {name_rows(rows)}.")
+        lacking = "position or direction" if "sliding_direction" in columns else "position"
+        notes.append(f"Left out, for they have no {lacking}: {name_rows(rows)}.")
         columns = {name: values[finite] for name, values in columns.items()}
     if "repeat" in columns:
         columns["repeat"] = np.unique(columns["repeat"], return_inverse=True)[1]

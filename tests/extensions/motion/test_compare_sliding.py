@@ -74,6 +74,37 @@ def test_a_backlash_that_is_not_counted_is_friction_and_own_centres_do_not_see_i
     assert 0.3 - found(play, 1e-9) == pytest.approx(20e-6 / 3e-3, rel=0.15)
 
 
+def failed(comparison):
+    return {check.kind for check in comparison.checks if not check.passed}
+
+
+def test_a_backlash_larger_than_stated_and_a_wrong_direction_are_seen():
+    assert failed(compared(scan(0.3, backlash=200e-6), 5e-6)) == {"skew_and_shift"}
+    right = scan(0.3)
+    wrong = replace(right, sliding_direction=-right.sliding_direction)
+    assert "negative_friction" in failed(compared(wrong, 5e-6))
+    assert "negative_friction" in failed(compared(replace(wrong, u_zz_errors=None)))
+
+
+def test_a_noise_that_is_not_stated_is_that_about_sliding_contacts():
+    made = replace(sliding_scan(Slid(0.6), 1, BOTH), u_zz_errors=None)
+    [note] = [one.text for one in compared(made).messages if one.kind == "noise_unstated"]
+    size = sliding_scan(Slid(0.6), 1, BOTH).u_zz_errors[0, 0]
+    # 402 readings tell it to 4 %.
+    assert float(note.split()[6]) == pytest.approx(1e3 * size, rel=0.15)
+
+
+def test_directions_and_speeds_are_held_against_the_times():
+    made = scan(0.3)
+    once = np.arange(201.0)
+    time = np.stack([once, 500.0 - once])
+    assert memscal.measure_stress(replace(made, time=time), APPARATUS).scans[0].speed == 1e-4
+    with pytest.raises(InputError, match="against its direction of sliding"):
+        memscal.measure_stress(replace(made, time=np.stack([once, 300.0 + once])), APPARATUS)
+    with pytest.raises(InputError, match=r"slid at 0\.05 to 0\.1 mm/s"):
+        memscal.measure_stress(replace(made, time=time * [[1.0], [2.0]]), APPARATUS)
+
+
 def test_speeds_are_told_apart_and_held_against_the_tangential_load(tmp_path, run):
     ratios = {1e-3: 0.3, 2e-3: 0.2}
     paths = []
@@ -91,8 +122,9 @@ def test_speeds_are_told_apart_and_held_against_the_tangential_load(tmp_path, ru
     assert figure.stat().st_size > 10_000
     speeds = {one["speed"]["value"]: one["value"] for one in printed["speeds"]}
     assert speeds == pytest.approx({1.0: 0.3, 2.0: 0.2}, abs=2e-3)
-    failed = {check["name"] for check in printed["checks"] if not check["passed"]}
-    assert failed == {"sliding_friction_3", "sliding_friction_4"}
+    fails = {check["name"] for check in printed["checks"] if not check["passed"]}
+    assert fails == {"sliding_friction_3", "sliding_friction_4"}
+    assert [one["value"] for one in printed["joint"]] == [None]
     assert outcome.code == 1
 
 
@@ -104,6 +136,7 @@ def test_speeds_are_told_apart_and_held_against_the_tangential_load(tmp_path, ru
         ({"motion": "", "sliding_direction": None}, {"sliding": True}, "not state .* slid"),
         ({"sliding_direction": None}, {"sliding": True}, "direction of sliding"),
         ({}, {"sliding": True, "macroscopic": 0.3}, "options of the normal one"),
+        ({}, {"sliding": True, "backlash": 5e-6}, "passes forth and back"),
     ],
 )
 def test_what_does_not_belong_together_is_refused(change, options, message):

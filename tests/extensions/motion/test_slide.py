@@ -140,6 +140,8 @@ def test_what_does_not_slide_here_is_refused():
     cases = [
         ({"indenter": memscal.Rod(radius=1e-3)}, InputError, "A rod is given"),
         ({"friction": -0.1}, InputError, "friction is -0.1"),
+        ({"points": 7}, InputError, "7 points are asked for"),
+        ({"points": 33.5}, InputError, "33.5 points"),
         ({"direction": 0.5}, InputError, "direction 0.5"),
         ({"load": 1e-5}, DomainError, "a half-space to it"),
         ({"indenter": bowl}, DomainError, "reaches beyond the profile's known face"),
