@@ -116,7 +116,7 @@ def require_pressed(motion: str, source: SourceFile | None) -> None:
             why="The calculated contacts are those of an indenter that is pressed straight down; "
             "sliding friction shifts and skews the stress at the base of the film.",
             cure="Give a scan whose indenter was pressed at each place. What stress a sliding one "
-            "made, memscal restore finds, and its friction memscal compare --sliding.",
+            "made, memscal restore finds, and the friction of a sphere memscal compare --sliding.",
         )
 
 

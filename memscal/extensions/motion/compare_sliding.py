@@ -50,6 +50,7 @@ from memscal.measurement.restore import noise_unstated_message
 from memscal.model.arrays import (
     ArrayPair,
     FloatArray,
+    IndexArray,
     Values,
     floats,
     keyword_array_record,
@@ -61,6 +62,8 @@ from memscal.model.measured_stress import MeasuredProfile, MeasuredStress
 _SAME_LOAD = 0.05
 #: Standard deviation of a centre that is not known, in m.
 _ANYWHERE = 0.1
+#: What a restoration tests, and finds, is of a round stress.
+_OF_ROUND = (FAILED_CHECK, NOISE_UNSTATED)
 #: Standard uncertainties by which two coefficients differ.
 _APART = 3.0
 _DIFFER = "The friction differs between the speeds."
@@ -169,25 +172,20 @@ def compare_sliding(
     backlash: float | None,
 ) -> SlidingComparison:
     """Hold measured stress against sliding contacts; ``setting``: that of a family."""
-    # What a restoration's checks test is a round stress.
-    of_round = (FAILED_CHECK, NOISE_UNSTATED)
-    others = [each for each in measured.messages if each.kind not in of_round]
+    others = [note for note in measured.messages if note.kind not in _OF_ROUND]
     profiles = measured.profiles
-    loads = np.sort(measured.loads)
-    larger = loads[1:][np.diff(loads) > _SAME_LOAD * loads[:-1]]
-    numbers = np.searchsorted(larger, measured.loads, "right").tolist()
     speeds = [(profile.lubrication, profile.scan.speed) for profile in profiles]
-    keys = [*zip(speeds, numbers, strict=True)]
+    keys = [*zip(speeds, _numbered(measured.loads).tolist(), strict=True)]
 
     family = sliding_family(setting)
     sensor = sensor_of(apparatus, family, setting["reach"], measured.scans)
-    if backlash is not None and max(np.bincount(indicators(keys).argmax(axis=1))) == 1:
+    own = indicators(range(len(keys)))
+    sharing = own if backlash is None else indicators(keys)
+    if backlash is not None and sharing.shape == own.shape:
         raise InputError(
             "A backlash is given, and no load and speed has passes forth and back.",
             cure="Leave it out (--backlash).",
         )
-    own = indicators(range(len(keys)))
-    sharing = own if backlash is None else indicators(keys)
     points = _points(profiles, sharing, between_scan_gain, backlash or 0.0)
     at_loads = family.only(np.searchsorted(family.loads, measured.loads).tolist())
     channel = SlidingChannel(points, sensor, at_loads)
@@ -196,28 +194,22 @@ def compare_sliding(
     if not tested:
         # Readings scatter by more than their noise about a round stress.
         found = _by(keys, fit)
-        left = [math.sqrt(found[key].least / found[key].degrees) for key in keys]
-        points = [replace(p, noise=size * p.noise) for p, size in zip(points, left, strict=True)]
+        points = [_of_noise(p, found[key]) for p, key in zip(points, keys, strict=True)]
         channel = replace(channel, points=points)
         fit = fit_friction(channel)
-        least = min(each.noise.min() for each in points)
+        least = min(p.noise.min() for p in points)
         others.append(noise_unstated_message(measured.scans[0].reading.text(least)))
     process = replace(measured.process, messages=tuple(others))
     measured = replace(measured, checks=(), process=process)
     by_speed = _by(speeds, fit)
-    checks = [*_directions(speeds, fit)]
+    each = _by(keys, fit)
+    checks = [*_directions(speeds, fit), *_agreements(profiles, [each[key] for key in keys])]
     if tested:
         checks += _misfits(by_speed.values())
     if backlash is not None:
         apart = [replace(p, sharing=row) for p, row in zip(points, own, strict=True)]
-        alone = _by(speeds, fit_friction(replace(channel, points=apart)))
-        checks += _shifts(by_speed, alone)
-    each = _by(keys, fit)
-    checks += _agreements(profiles, [each[key] for key in keys])
-    joint = {}
-    for state, estimate in _told(_by([p.lubrication for p in profiles], fit), tested).items():
-        of_state = [found for (of, _), found in by_speed.items() if of == state]
-        joint[state] = {SLIDING: estimate if _agree(of_state) else unexplained(estimate, _DIFFER)}
+        checks += _shifts(by_speed, _by(speeds, fit_friction(replace(channel, points=apart))))
+    joint = _joint([profile.lubrication for profile in profiles], by_speed, fit, tested)
     by_pass = _told(_by(range(len(keys)), fit), tested)
     stated = {key: found for key, found in _told(by_speed, tested).items() if key[1]}
     return SlidingComparison(
@@ -232,6 +224,32 @@ def compare_sliding(
         curves=tuple(_curve(fit, i, each[key].best) for i, key in enumerate(keys)),
         backlash=backlash,
     )
+
+
+def _numbered(loads: FloatArray) -> IndexArray:
+    """Return which of the loads each is, the smallest first."""
+    ordered = np.sort(loads)
+    larger = ordered[1:][np.diff(ordered) > _SAME_LOAD * ordered[:-1]]
+    return np.searchsorted(larger, loads, "right")
+
+
+def _joint(
+    states: Sequence[str],
+    by_speed: Mapping[tuple[str, float | None], BoundedEstimate],
+    fit: FrictionFit,
+    tested: bool,
+) -> dict[str, dict[str, BoundedEstimate]]:
+    """Return the coefficient of all passes of each state, if it does not differ by speed."""
+    joint = {}
+    for state, estimate in _told(_by(states, fit), tested).items():
+        of_state = [found for (of, _), found in by_speed.items() if of == state]
+        joint[state] = {SLIDING: estimate if _agree(of_state) else unexplained(estimate, _DIFFER)}
+    return joint
+
+
+def _of_noise(points: SlidingPoints, found: BoundedEstimate) -> SlidingPoints:
+    """Return the points of a pass with the noise by which they scatter about a fit."""
+    return replace(points, noise=math.sqrt(found.least / found.degrees) * points.noise)
 
 
 def _groups(keys: Sequence[Any]) -> dict[Any, list[int]]:
@@ -333,14 +351,12 @@ def _directions(keys: Sequence[Any], fit: FrictionFit) -> Iterator[QualityCheck]
         information = along.slope_fit()[0][0]
         # A parabola by its first values and its curvature.
         below = (rise / step - information * step) / (2 * math.sqrt(information))
-        yield check(
+        yield _check_in_u(
             f"negative_friction_{i}",
             max(below, 0.0),
-            _APART,
             "How far the friction that explains the passes of a speed best would be below zero, "
             "in its standard uncertainty. A failure means that the direction of sliding or of the "
             "positions is not as stated, that the backlash is larger, or that the sensor lags.",
-            math.erfc(max(below, 0.0) / math.sqrt(2)) / 2,
         )
 
 
@@ -351,15 +367,12 @@ def _shifts(
     for i, (key, both) in enumerate(found.items(), start=1):
         by_skew = alone[key]
         u = _uncertainty(by_skew)
-        off = abs(by_skew.best - both.best) / u
-        yield check(
+        yield _check_in_u(
             f"skew_and_shift_{i}",
-            off,
-            _APART,
+            abs(by_skew.best - both.best) / u,
             f"Difference of the friction by the skew alone, {by_skew.best:.3g}, from that by skew "
             f"and shift, {both.best:.3g}, in its standard uncertainty of {u:.2g}. A failure means "
             "that the backlash is larger than stated, or that the sensor lags.",
-            math.erfc(off / math.sqrt(2)),
         )
 
 
@@ -380,14 +393,16 @@ def _agreements(
             if value is None:
                 continue
             u = math.hypot(_uncertainty(found), u_value or 0.0)
-            off = abs(found.best - value) / u
-            yield check(
+            yield _check_in_u(
                 f"{name}_{i}",
-                off,
-                _APART,
+                abs(found.best - value) / u,
                 f"Difference of the sliding friction at {profile.label}, {found.best:.3g}, from "
                 f"{value:.3g}, in its standard uncertainty of {u:.2g}. A failure means that a load "
                 "cell, the film or the direction is not as stated, or that the shear is not in "
                 "proportion to the pressure.",
-                math.erfc(off / math.sqrt(2)),
             )
+
+
+def _check_in_u(name: str, off: float, meaning: str) -> QualityCheck:
+    """Return the check of a difference in standard uncertainties."""
+    return check(name, off, _APART, meaning, math.erfc(off / math.sqrt(2)))
