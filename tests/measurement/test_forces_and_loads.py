@@ -131,5 +131,5 @@ def test_each_load_and_direction_of_a_sliding_scan_is_a_profile():
     assert "direction of sliding back" in [" ".join(row.split()) for row in rows]
     with pytest.raises(InputError, match="slid forth and back, and no direction is chosen"):
         memscal.restore(scan, SENSOR, load=LOADS[0])
-    with pytest.raises(InputError, match="no stated direction, and back is chosen"):
+    with pytest.raises(InputError, match="no direction of sliding, and back is chosen"):
         memscal.restore(contact_scan(1), SENSOR, direction="back")
