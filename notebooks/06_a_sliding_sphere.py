@@ -235,7 +235,7 @@ Markdown("\n".join(lines))
 # ## 6. What the low-pass does if it is not stated
 #
 # At 10 mm/s it lags by 0.16 mm, forth and back, and so does the peak of the stress: the opposite of
-# what friction does. `tangential_load` then fails.
+# what friction does. `tangential_load` and `skew_and_shift` then fail.
 
 # %%
 fast = memscal.read_scan(scans[2])
