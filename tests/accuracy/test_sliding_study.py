@@ -42,8 +42,8 @@ def drawn(seed):
 
 
 @cache
-def estimates(friction, ways):
-    """The coefficients of all experiments."""
+def comparisons(friction, ways):
+    """The comparisons of all experiments."""
     found = []
     for seed in range(EXPERIMENTS):
         apparatus, true = drawn(seed)
@@ -57,8 +57,13 @@ def estimates(friction, ways):
             backlash=BACKLASH if ways == BOTH else None,
             cache=user_cache_folder(),
         )
-        found.append(compared.joint[""]["sliding"])
+        found.append(compared)
     return found
+
+
+def estimates(friction, ways):
+    """The coefficients of all experiments."""
+    return [compared.joint[""]["sliding"] for compared in comparisons(friction, ways)]
 
 
 @WAYS
@@ -85,3 +90,10 @@ def test_without_friction_there_is_a_bound(ways):
     bounds = [one.interval for one in estimates(0.0, ways)]
     assert sum(bound.low == 0 for bound in bounds) >= binom.ppf(CHANCE, len(bounds), 0.95)
     assert np.median([bound.upper for bound in bounds]) < 3 * BOUNDS[ways]
+
+
+@WAYS
+def test_checks_fail_by_chance_alone(ways):
+    failed = [not one.passed for mu in FRICTIONS for one in comparisons(mu, ways)]
+    # Up to three checks, each of which chance fails in one of 370 or fewer.
+    assert sum(failed) <= binom.ppf(1 - CHANCE, len(failed), 3 / 370)
