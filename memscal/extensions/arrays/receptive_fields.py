@@ -68,7 +68,7 @@ class ReceptiveFields:
     radii: FloatArray  # (r,): evenly spaced, in m
     loads: FloatArray  # (q,): of the tables, in N
     contact_radii: FloatArray  # (q,): in m
-    # f, f'/R, -g/R and -(g/R)'/R per newton: (loads, kernels, radii, 4).
+    # f, f'/R, -g/R and -(g/R)'/R per newton: (4, loads, kernels, radii).
     profiles: FloatArray
     # Changes of f by the kernels' modes and by inputs that the contact has, too, (changes, radii);
     # whose sensor's each is, or ALL; and their sizes by one u of each independent error.
@@ -90,9 +90,9 @@ class ReceptiveFields:
 
     def normal(self, places: FloatArray, force: FloatArray | float = 1.0) -> ArrayTriple:
         """Fields per newton without shear, and their derivatives by x and y, (m, n) each."""
-        offsets = places[:, None] - self.centres
-        value, slope, _, _ = np.moveaxis(self._looked_up(offsets, force), -1, 0)
-        along_x, along_y = slope * np.moveaxis(offsets, -1, 0)
+        offsets = self._offsets(places)
+        value, slope = self._looked_up(offsets, force, columns=2)
+        along_x, along_y = offsets * slope
         return value @ self.mixing.T, along_x @ self.mixing.T, along_y @ self.mixing.T
 
     def forward(self, places: FloatArray, force: FloatArray, shear: FloatArray) -> ArrayPair:
@@ -126,35 +126,41 @@ class ReceptiveFields:
         self, places: FloatArray, force: FloatArray | float, shear: FloatArray
     ) -> FloatArray:
         """Return what :meth:`forward` does per newton, of each sensor alone, (m, n, 5)."""
-        offsets = places[:, None] - self.centres
-        table = self._looked_up(offsets, force)
-        pull = np.einsum("mnk,mk->mn", offsets, shear)
-        along = offsets * (table[..., 1] + pull * table[..., 3])[..., None]
-        towards = table[..., 2:3]
-        along += shear[:, None] * towards
-        value = table[..., :1] + pull[..., None] * towards
-        return np.concatenate([along, value, offsets * towards], axis=-1)
+        offsets = self._offsets(places)
+        value, slope, towards, turned = self._looked_up(offsets, force, columns=4)
+        pull = np.einsum("kmn,mk->mn", offsets, shear)
+        along = offsets * (slope + pull * turned)
+        along += shear.T[..., None] * towards
+        return np.stack([*along, value + pull * towards, *offsets * towards], axis=-1)
 
-    def _looked_up(self, offsets: FloatArray, force: FloatArray | float) -> FloatArray:
-        """Return the profiles at offsets and forces, (m, n, 4), interpolated."""
-        loads, kernels, radii, columns = self.profiles.shape
-        table = self.profiles.reshape(-1, columns)
-        apart = np.sqrt(np.einsum("mnk,mnk->mn", offsets, offsets)) / self.radii[1]
+    def _offsets(self, places: FloatArray) -> FloatArray:
+        """Return places from the centre of each sensor, (2, m, n)."""
+        axes = zip(places.T, self.centres.T, strict=True)
+        return np.stack([np.subtract.outer(place, centre) for place, centre in axes])
+
+    def _looked_up(
+        self, offsets: FloatArray, force: FloatArray | float, *, columns: int
+    ) -> FloatArray:
+        """Return the first of the profiles at offsets and forces, (columns, m, n), interpolated."""
+        _, loads, kernels, radii = self.profiles.shape
+        table = self.profiles[:columns].reshape(columns, -1)
+        x, y = offsets
+        apart = np.sqrt(x**2 + y**2) / self.radii[1]
         apart = np.minimum(apart, radii - 1 - _AXIS)
         near = apart.astype(np.intp)
-        share = (apart - near)[..., None]
+        share = apart - near
         near += radii * (np.arange(self.sensors.size) % kernels)
         # The stress falls by the square of the contact radius, which Hertz has as P^(2/3).
         pressed = np.maximum(force, 0.0)
         place = np.interp(np.power(pressed, 2 / 3), self.loads ** (2 / 3), np.arange(loads))
         place = np.reshape(place, (-1, 1))
-        found = np.zeros((*apart.shape, columns))
+        found = np.zeros((columns, *apart.shape))
         for above in range(min(loads, 2)):
             level = np.floor(place) + above
             first = near + kernels * radii * np.minimum(level, loads - 1).astype(np.intp)
-            lower = table.take(first, axis=0)
-            between = lower + share * (table.take(first + 1, axis=0) - lower)
-            found += (1 - np.abs(place - level))[..., None] * between
+            lower = table.take(first, axis=1)
+            between = lower + share * (table.take(first + 1, axis=1) - lower)
+            found += (1 - np.abs(place - level)) * between
         return found
 
 
@@ -194,7 +200,7 @@ def receptive_fields(array: ArrayData, indenter: RoundIndenter | None = None) ->
     spectra = ((pressures * transfers)[:, None] * kernels).reshape(-1, nodes.k.size).T
     # A sensor is seen from the contact in the direction opposite to their offset.
     columns = _by_radius(nodes, radii, spectra, -(by_shear / by_pressure)[:, None])
-    shape = (loads.size, len(kernels), radii.size, len(columns))
+    shape = (len(columns), loads.size, len(kernels), radii.size)
 
     # What is uncertain is taken at the middle load, and of the mean kernel.
     modes = radial_spline(array.k, array.modes.changes.T)(at).T * (by_pressure + change)
@@ -213,7 +219,7 @@ def receptive_fields(array: ArrayData, indenter: RoundIndenter | None = None) ->
         radii=radii,
         loads=loads,
         contact_radii=contact_radii,
-        profiles=np.ascontiguousarray(columns.transpose(2, 1, 0)).reshape(shape),
+        profiles=np.ascontiguousarray(columns.swapaxes(1, 2)).reshape(shape),
         changes=nodes.synthesise(changes.T, radii).T,
         owner=np.append(array.modes.owner, np.full(len(inputs), ALL)),
         sizes=np.vstack([array.split(array.columns)[4], by_input]),

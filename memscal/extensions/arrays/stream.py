@@ -315,7 +315,7 @@ class Stream:
         grid = self._grid[:, -1]
         filtered = grid @ weight
         size = np.sqrt(np.sum(filtered * grid, axis=1))
-        significance = deviations @ (filtered.T / size)
+        significance = deviations @ filtered.T / size
         node = significance.argmax(axis=1)
         rows = np.flatnonzero(significance.max(axis=1) > threshold)
         node = node[rows]
