@@ -266,7 +266,7 @@ def locate(
     outside = np.zeros(len(values), bool)
     sought = np.zeros(len(values), bool)
     grid = seeking.grid()
-    on_grid = fields.normal(grid)[0]
+    on_grid = fields.value(grid)
     for kept, frames in patterns(np.isfinite(values)):
         if kept.sum() <= len(seeking.axes):
             continue
@@ -350,8 +350,8 @@ def at_an_end(array: ArrayData, readings: FloatArray, *, tared: bool) -> BoolArr
 
 def patterns(seen: BoolArray) -> Iterator[tuple[BoolArray, IndexArray]]:
     """Yield which sensors read, and the frames of which that is so."""
-    # Bytes are sorted twenty times faster than the bits that they hold.
-    packed = np.packbits(seen, axis=1)
-    _, first, of = np.unique(packed, axis=0, return_index=True, return_inverse=True)
-    for i, frame in enumerate(first):
-        yield seen[frame], np.flatnonzero(of.ravel() == i)
+    frames: dict[bytes, list[int]] = {}
+    for frame, packed in enumerate(np.packbits(seen, axis=1)):
+        frames.setdefault(packed.tobytes(), []).append(frame)
+    for alike in frames.values():
+        yield seen[alike[0]], np.array(alike)

@@ -63,8 +63,13 @@ class MeasuredFields:
         """Contact radii, which are not known."""
         return np.full_like(force, np.nan)
 
+    def value(self, places: FloatArray, *_: Any) -> FloatArray:
+        """Fields per press, (m, n)."""
+        x, y = places.T
+        return np.stack([one.ev(x, y) for one in self._splines], axis=1)
+
     def normal(self, places: FloatArray, *_: Any) -> ArrayTriple:
-        """Fields per press, and their derivatives by x and y, (m, n) each."""
+        """The same, and their derivatives by x and y, (m, n) each."""
         x, y = places.T
         h, by_x, by_y = (
             np.stack([one.ev(x, y, *order) for one in self._splines], axis=1) for order in _ORDERS

@@ -88,8 +88,13 @@ class ReceptiveFields:
         # Hertz has them as P^(1/3).
         return np.interp(np.cbrt(force), np.cbrt(self.loads), self.contact_radii)
 
+    def value(self, places: FloatArray, force: FloatArray | float = 1.0) -> FloatArray:
+        """Fields per newton without shear, (m, n)."""
+        [value] = self._looked_up(self._offsets(places), force, columns=1)
+        return floats(value @ self.mixing.T)
+
     def normal(self, places: FloatArray, force: FloatArray | float = 1.0) -> ArrayTriple:
-        """Fields per newton without shear, and their derivatives by x and y, (m, n) each."""
+        """The same, and their derivatives by x and y, (m, n) each."""
         offsets = self._offsets(places)
         value, slope = self._looked_up(offsets, force, columns=2)
         along_x, along_y = offsets * slope
