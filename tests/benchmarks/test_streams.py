@@ -6,7 +6,7 @@ from helpers.machine import once, show
 
 
 def test_a_stream_is_forty_times_faster_than_its_frames_located():
-    # One push of 100 frames of 64 sensors at 1 kHz, with a contact: 5 ms of an idle core.
+    # One push of 100 frames of 64 sensors at 1 kHz, with a contact: 3 to 5 ms of a core.
     array = known_array(8, 8)
     random = np.random.default_rng(39)
     noise = np.sqrt(array.noise[0, 0]) * random.normal(size=(30, 100, 64))

@@ -123,8 +123,7 @@ class _Fit:
     place: FloatArray  # (f, 2), in m
     force: FloatArray  # (f,), in N
     chi2: FloatArray  # (m,)
-    jacobian: FloatArray  # (f, c, n): changes by force times x (and y) and by force
-    covariance: FloatArray  # (f, c, c): of these
+    covariance: FloatArray  # (f, c, c): of force times x (and y), and of force
 
 
 class Stream:
@@ -340,14 +339,13 @@ class Stream:
         residual = deviations.copy()
         residual[rows] -= force[:, None] * self._seeking.fields.value(place, force)
         weighted = residual @ weight
-        jacobian = jacobian[like]
-        slope = np.einsum("fin,fn->fi", jacobian, weighted[rows])
+        slope = np.einsum("fin,fn->fi", jacobian[like], weighted[rows])
         step = np.einsum("fij,fj->fi", covariance, slope)
         chi2 = np.sum(weighted * residual, axis=1)
         chi2[rows] -= np.sum(step * slope, axis=1)
         step[:, -1] += force
         place, force = self._moved(place, step, least)
-        return _Fit(rows, node, place, force, chi2, jacobian, covariance)
+        return _Fit(rows, node, place, force, chi2, covariance)
 
     def _alike(self, place: FloatArray, force: FloatArray) -> tuple[ArrayPair, IndexArray]:
         """Return the places and forces that are not alike, and which of them is like each one."""
@@ -407,7 +405,8 @@ class Stream:
         best = now.evidence.argmax()
         summed = now.covariance + noise + self._unknown * np.diag(~seen)
         fit = self._fit(deviations[[best]], np.linalg.inv(summed[best]), _SPARED)
-        jacobian = fit.jacobian.reshape(-1, seen.size)
+        # Slopes of a place nearby would let what they miss into the baselines, block by block.
+        jacobian = self._slopes(fit.place, fit.force).reshape(-1, seen.size)
         for node in fit.node:
             summed += fit.force**2 * self._errors_at(node)[0]
         weight = np.linalg.inv(summed)
