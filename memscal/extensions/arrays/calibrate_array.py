@@ -253,12 +253,15 @@ def _presses(
     passes = scan.passes.ravel()
     if np.bincount(passes).min() < MINIMUM_POSITIONS:
         passes = np.zeros_like(passes)
+    of_pass = passes == np.arange(passes.max() + 1)[:, None]
+    # By so few readings a sensor has no baseline in a pass.
+    keep &= (keep.astype(int) @ of_pass.T >= MINIMUM_POSITIONS) @ of_pass
     # Each pass has a baseline and a drift.
     along = places[list(axes)]
     low = along.min(axis=1, keepdims=True)
     half = np.ptp(along, axis=1, keepdims=True) / 2
     straight = np.vstack([np.ones_like(passes), (along - low) / half - 1])
-    drift = np.vstack([straight * (passes == number) for number in range(passes.max() + 1)])
+    drift = np.vstack([straight * one for one in of_pass])
     stated = scan.u_zz_errors
     board = np.zeros(len(u), np.intp) if scan.board is None else scan.board
     return Presses(
@@ -277,10 +280,10 @@ def _presses(
 
 
 def _pairs(
-    scan: Scan, places: FloatArray, crosstalk: CrosstalkModel | Sequence[tuple[str, str]]
+    scan: Scan, near: BoolArray, crosstalk: CrosstalkModel | Sequence[tuple[str, str]]
 ) -> BoolArray:
-    """Return which sensors (rows) read which others, (n, n), at places (n, 2), NaN if unknown."""
-    n = len(places)
+    """Return which sensors (rows) read which others, (n, n), of which some are neighbours."""
+    n = len(near)
     if not isinstance(crosstalk, str):
         pairs = np.zeros((n, n), bool)
         for row, column in crosstalk:
@@ -290,14 +293,17 @@ def _pairs(
             pairs[scan.sensors.index(row), scan.sensors.index(column)] = True
         return pairs
     require_names("There is no model of crosstalk", [crosstalk], get_args(CrosstalkModel))
-    apart = ~np.eye(n, dtype=bool)
-    if crosstalk == "full":
-        return apart
-    if crosstalk == "none" or n == 1:
+    if crosstalk == "none":
         return np.zeros((n, n), bool)
+    return ~np.eye(n, dtype=bool) if crosstalk == "full" else near
+
+
+def _neighbours(places: FloatArray) -> BoolArray:
+    """Return which sensors are neighbours, (n, n), at places (n, 2), NaN if unknown."""
     distance = np.hypot(*(places[:, None] - places).T)
-    near: BoolArray = distance <= _NEIGHBOURS * np.nanmin(distance[apart])
-    return apart & near
+    np.fill_diagonal(distance, np.nan)
+    least = np.fmin.reduce(distance, axis=None)
+    return np.asarray(distance <= _NEIGHBOURS * least)
 
 
 def _begun(
@@ -328,10 +334,11 @@ def _begun(
         layout, _ = fitted_layout(scan.layout, centres[used], used)
         # Neighbours may read what a dead sensor does not tell.
         centres = np.where(used[:, None], centres, layout)
-    pairs = _pairs(scan, layout, crosstalk) & used[:, None] & np.isfinite(centres[:, 0])
+    near = _neighbours(layout)
+    pairs = _pairs(scan, near, crosstalk) & used[:, None] & np.isfinite(centres[:, 0])
     largest = int(np.argmax(np.where(used, found.peak, 0.0)))
     waves = Waves.of(references[0], np.hypot(*np.ptp(presses.places, axis=1)))
-    parameters = Layout.of(presses, pairs, largest, 0)
+    parameters = Layout.of(presses, pairs, near, largest, 0)
     none = np.zeros((forward.k.size, 0))
     model = JointModel(presses, waves, parameters, none, gaussian, forward)
     n = used.size
@@ -362,7 +369,8 @@ def _own_fit(fit: JointFit, *, shapes: bool) -> JointFit:
         ]
     own = np.hstack(kernels)
     largest = int(np.flatnonzero(model.presses.used & (model.layout.gains < 0))[0])
-    layout = Layout.of(model.presses, model.layout.crosstalk >= 0, largest, own.shape[1])
+    pairs = model.layout.crosstalk >= 0
+    layout = Layout.of(model.presses, pairs, model.layout.near, largest, own.shape[1])
     state = replace(fit.state, own=np.zeros((fit.state.gain.size, own.shape[1])))
     model = replace(model, layout=layout, own_kernels=own)
     rounds = _OWN_ROUNDS if shapes else 1

@@ -8,14 +8,15 @@ left is data and kernels of one sensor, of which the shape of G is found as that
 
     c_{ij} = m + e_{ij}, \qquad m \sim N(0,\,0.05^2), \qquad e_{ij} \sim N(0,\,t^2),
 
-with t by its marginal likelihood.  A prior about zero would take a common crosstalk for a
-ring of the common G.
+with t by its marginal likelihood, and a mean m of neighbours and one of all other pairs.  A prior
+about zero would take a common crosstalk for a ring of the common G.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
 from operator import attrgetter
+from typing import Any
 
 import numpy as np
 
@@ -32,7 +33,7 @@ from memscal.extensions.arrays.joint_model import (
     Noise,
     taken,
 )
-from memscal.model.arrays import FloatArray, array_record, floats
+from memscal.model.arrays import TINY, FloatArray, array_record, floats
 
 #: Standard deviations of crosstalk about its mean that are weighed, and that of the mean.
 SPREADS = (0.0005, 0.001, 0.002, 0.005, 0.01, 0.02, 0.05)
@@ -98,10 +99,11 @@ class JointFit:
 def prior_precision(layout: Layout, spread: float) -> FloatArray:
     """Return the prior precision of all parameters, (p, p); zero of what has a flat prior."""
     precision = np.zeros((layout.count, layout.count))
-    places = layout.crosstalk[layout.crosstalk >= 0]
-    # Of t^2 1 + m^2 1 1', by Sherman and Morrison.
-    alike = WIDEST**2 / (spread**2 + places.size * WIDEST**2)
-    precision[np.ix_(places, places)] = (np.eye(places.size) - alike) / spread**2
+    for kind in (layout.near, ~layout.near):
+        places = layout.crosstalk[kind & (layout.crosstalk >= 0)]
+        # Of t^2 1 + m^2 1 1', by Sherman and Morrison.
+        alike = WIDEST**2 / (spread**2 + places.size * WIDEST**2)
+        precision[np.ix_(places, places)] = (np.eye(places.size) - alike) / spread**2
     for i, places in enumerate(layout.own.T):
         own = places[places >= 0]
         precision[own, own] = (_OWN_SHAPE if i else OWN_WIDTH) ** -2
@@ -137,10 +139,17 @@ def noise_of(model: JointModel, state: ArrayState) -> Noise:
     residual = np.where(presses.keep, presses.u - model.predicted(state), 0.0)
     errors = model.press_errors(state)
     count = np.maximum(presses.keep.sum(axis=1), 1)
-    both = np.maximum(presses.keep.astype(float) @ presses.keep.T, 1)
-    of_presses = np.sum(errors @ errors.mT, axis=0) / both
     freedom = np.maximum(1 - model.layout.count / presses.used.sum() / count, 0.1)
-    square = residual @ residual.T / both / np.sqrt(np.outer(freedom, freedom)) - of_presses
+    smallest = (_ROUNDING * np.ptp(presses.u, axis=1)) ** 2
+    # Presses whose stated errors are small to a sensor, as it is far from them, tell its noise.
+    kept = np.ma.masked_array(residual**2, ~presses.keep)
+    # Masked arrays of numpy have no types.
+    typical: Any = np.ma.median(kept, axis=1)  # type: ignore[no-untyped-call]
+    level = typical.filled(0.0) + np.maximum(smallest, TINY)
+    weight = presses.keep / (level[:, None] + np.sum(errors**2, axis=0))
+    weighed = weight * np.concatenate([residual[None], errors])
+    of_all, *of_errors = weighed @ weighed.mT / np.maximum(weight @ weight.T, TINY)
+    square = of_all / np.sqrt(np.outer(freedom, freedom)) - sum(of_errors)
     common = np.zeros_like(square)
     for i in np.unique(presses.board):
         members = np.flatnonzero(presses.used & (presses.board == i))
@@ -152,9 +161,10 @@ def noise_of(model: JointModel, state: ArrayState) -> Noise:
     if presses.stated is not None:
         stated = np.sum(presses.stated**2, axis=1, where=presses.keep) / count
         total = np.maximum(total, stated)
-    largest = np.ptp(presses.u, axis=1)
-    least = np.maximum(_LEAST_OWN * total, (_ROUNDING * largest) ** 2)
+    least = np.maximum(_LEAST_OWN * total, smallest)
     least[~presses.used] = 1.0
+    both = np.maximum(presses.keep.astype(float) @ presses.keep.T, 1)
+    of_presses = np.sum(errors @ errors.mT, axis=0) / both
     return Noise(np.maximum(total - np.diag(common), least), common, of_presses)
 
 

@@ -65,19 +65,24 @@ class Layout:
     crosstalk: IndexArray  # (m, m): -1 where not estimated
     drift: IndexArray  # (m, d)
     own: IndexArray  # (m, o)
+    near: BoolArray  # (m, m): neighbours, whose crosstalk has a mean of its own
     count: int
 
     @classmethod
-    def of(cls, presses: Presses, pairs: BoolArray, largest: int, own: int) -> Layout:
+    def of(
+        cls, presses: Presses, pairs: BoolArray, near: BoolArray, largest: int, own: int
+    ) -> Layout:
         """Count the parameters of an array with crosstalk of pairs (m, m)."""
         used = presses.used
         m = used.size
         some = np.arange(m) != largest
+        # A sensor may have no readings in a pass.
+        passed = presses.keep.astype(float) @ (presses.drift != 0) > 0
         free = [
             used & some,
             np.broadcast_to(used, (len(presses.axes), m)),
             pairs,
-            np.broadcast_to(used[:, None], (m, presses.drift.shape[1])),
+            passed,
             np.broadcast_to(used[:, None], (m, own)),
         ]
         places = []
@@ -88,7 +93,7 @@ class Layout:
             count += int(mask.sum())
             places.append(numbers)
         gains, centres, crosstalk, drift, changes = places
-        return cls(gains, centres, crosstalk, drift, changes, count)
+        return cls(gains, centres, crosstalk, drift, changes, near, count)
 
     def moved(self, state: ArrayState, change: FloatArray, axes: tuple[int, ...]) -> ArrayState:
         """Return a state changed by the parameters (p,)."""
@@ -181,8 +186,9 @@ class JointModel:
         for i in np.flatnonzero(presses.used):
             row = state.crosstalk[i]
             near = np.flatnonzero((row != 0) | (layout.crosstalk[i] >= 0))
-            names = [np.zeros(1, np.intp), 1 + layout.drift[i]]
-            columns = [data[i][:, None], presses.drift]
+            drifts = layout.drift[i] >= 0
+            names = [np.zeros(1, np.intp), 1 + layout.drift[i, drifts]]
+            columns = [data[i][:, None], presses.drift[:, drifts]]
             of_all = np.zeros((presses.load.size, q))
             for j in near:
                 whole = by_kernel[j]
