@@ -13,7 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from memscal.axisymmetry.hankel import ACROSS
+from memscal.axisymmetry.hankel import ACROSS, RadialSpectrum
 from memscal.axisymmetry.kernels import gaussian_transfer
 from memscal.estimation.points import ScanPoints
 from memscal.estimation.profile import ProfileEstimate
@@ -87,7 +87,8 @@ def _of_lines(estimate: ProfileEstimate) -> dict[str, Influence]:
 
 def _of_film(scans: Sequence[Scan], estimate: ProfileEstimate) -> dict[str, Influence]:
     """Influences of base, shear, law, Poisson's ratio and thickness of the films."""
-    by_scan = [_film_changes(scan, estimate, i) for i, scan in enumerate(scans)]
+    both = zip(scans, estimate.model.references, strict=True)
+    by_scan = [assumed_of_film(scan, reference) for scan, reference in both]
     found = {}
     for name in set.intersection(*map(set, by_scan)):
         first, second = zip(*(each[name] for each in by_scan), strict=True)
@@ -104,9 +105,8 @@ def signal_by(estimate: ProfileEstimate, changes: Sequence[FloatArray]) -> Float
     return model.signal(estimate.gaussian.geometry, estimate.kernel)
 
 
-def _film_changes(scan: Scan, estimate: ProfileEstimate, number: int) -> dict[str, ArrayPair]:
-    """Changes of one scan's reference by one unit of each property of its film, and its square."""
-    reference = estimate.model.references[number]
+def assumed_of_film(scan: Scan, reference: RadialSpectrum) -> dict[str, ArrayPair]:
+    """Changes of a scan's reference by one unit of each property of its film, and its square."""
     if scan.film is None or scan.indenter is None or reference.source:
         return {}
     set_up = scan.set_up.expected

@@ -37,6 +37,17 @@ _SHORT = 0.1
 _UNSTATED = 0.03
 #: A layout is turned and scaled by a factor this near to 1: by 30 degrees, or by a half.
 _ALIKE = 0.5
+#: A sensor so far beside a line, in widths of G, has an A that is 0.5 % too small.
+_BESIDE = 0.1
+#: What a scan may state of which a calibration of an array makes nothing.
+_UNCOUNTED = (
+    "gain_curvature_uncertainty",
+    "roundness_uncertainty",
+    "line_offset_uncertainty",
+    "baseline_curvature_uncertainty",
+    "u_zz_correlation",
+    "noise_record",
+)
 #: Presses whose covariances are held at once.
 _PRESSES = 500
 
@@ -121,6 +132,10 @@ def _layout(array: ArrayData) -> Failing:
         stated = abs(factor) * array.layout_uncertainty
     variance = np.nanmean(array.centre_uncertainties[used] ** 2, axis=1) + stated**2
     squares = np.sum(left**2, axis=1) / variance
+    # Of a single line all sensors are taken to be on it.
+    turned, _ = fitted_layout(array.layout, array.places[used], array.used)
+    beside = np.sum((turned - array.places)[used] ** 2, axis=1, where=~known)
+    squares += beside / (stated**2 + (_BESIDE * array.gaussian_sigmas[used]) ** 2)
     axes = known.sum()
     degrees = axes * (used.size - 2)
     return (
@@ -128,9 +143,10 @@ def _layout(array: ArrayData) -> Failing:
             "layout",
             squares.sum(),
             chi_square_limit(degrees),
-            "Chi-square of the centres against the layout, of a line along it. The layout may be "
-            "shifted, turned by up to 30 degrees and scaled by up to 50 %. A failure means that "
-            "sensors are elsewhere, or that names, units or axes of the layout are wrong.",
+            "Chi-square of the centres against the layout, which may be shifted, turned by up to "
+            "30 degrees and scaled by up to 50 %. A failure means that sensors are elsewhere, or "
+            "beside a single line, which needs a raster, or that names, units or axes of the "
+            "layout are wrong.",
             float(chdtrc(degrees, squares.sum())),
         ),
         used[squares > chdtri(axes, FALSE_ALARM / used.size)],
@@ -191,9 +207,9 @@ def _models_agree(fit: JointFit, compared: JointFit) -> Failing:
             "crosstalk_model",
             np.sqrt(np.mean(z**2)),
             _AGREEING,
-            "Difference of A and crosstalk by a common and by own shapes of G, over its "
-            "uncertainty, root mean square. A failure means that the sensors' shapes differ: take "
-            "own ones, of a raster.",
+            "Difference of A and crosstalk by a common G and by own widths, or shapes of a raster, "
+            "over its uncertainty, root mean square. A failure means that the sensors' shapes "
+            "differ: take own ones, of a raster.",
         ),
         used[z[:m] > chdtri(1, FALSE_ALARM / m) ** 0.5],
     )
@@ -329,7 +345,14 @@ def array_messages(
     yield from override_messages(prepared.overridden)
     if found.dead.any():
         names = ", ".join(np.array(scan.sensors)[found.dead])
-        yield Message("dead_taxels", f"Dead and left out: {names}.", "warning")
+        # Of a sensor at an unknown place no crosstalk is fitted.
+        lost = found.dead & ~fit.model.layout.near.any(axis=0)
+        unread = " What others read of them is not fitted: state a layout." if lost.any() else ""
+        yield Message("dead_taxels", f"Dead and left out: {names}.{unread}", "warning")
+    uncounted = [name for name in _UNCOUNTED if getattr(scan, name) is not None]
+    if uncounted:
+        text = f"Stated, but not counted of an array: {', '.join(uncounted)}."
+        yield Message("not_counted", text, "warning")
     numbers = fit.model.layout.crosstalk
     places = numbers[numbers >= 0]
     if places.size and not failing.get("crosstalk_identified"):

@@ -15,6 +15,7 @@ from memscal.errors import FitError, InputError, counted, require_names
 from memscal.estimation.departures import SHAPES
 from memscal.estimation.forward import ForwardModel
 from memscal.estimation.gaussian import fit_gaussian_to_points
+from memscal.estimation.influences import assumed_of_film
 from memscal.estimation.points import MINIMUM_POSITIONS, measured_points
 from memscal.estimation.reference_spectra import (
     expected_spectra,
@@ -45,6 +46,7 @@ from memscal.model.checks import QualityCheck, failed_check_messages
 from memscal.model.film import LINEAR, FilmLaw
 from memscal.model.indenter import Rod
 from memscal.model.provenance import Process
+from memscal.model.quantities import MM
 from memscal.model.result import Gridded, Shown
 from memscal.model.scan import Scan, common_circumstances
 from memscal.parallel import single_threaded
@@ -60,6 +62,8 @@ _OWN_SHAPES = (SHAPES[0], SHAPES[-2])
 _AT_FIRST = 0.01
 #: Rounds of a fit with own shapes; widths alone are a small change, which is linear.
 _OWN_ROUNDS = 4
+#: A row is even if its sensors are within this share of the pitch from even places.
+_UNEVEN = 0.1
 #: Readings above this share of a peak count for its place.
 _HIGH = 0.4
 
@@ -225,6 +229,13 @@ def _opened(scan: Scan | str | PathLike[str], *, accept_altered: bool) -> Scan:
             why="An array is calibrated by readings that follow the stress at once.",
             cure="Scan so slowly that they do, or hold the indenter, and leave the dynamics out.",
         )
+    if opened.line_offset:
+        raise InputError(
+            f"The line of the scan passes {opened.line_offset / MM:g} mm beside the sensors "
+            "(/entry/data/line_offset).",
+            why="A single line is taken to pass over all sensors of an array.",
+            cure="Scan a raster, which finds both coordinates of each sensor.",
+        )
     return opened
 
 
@@ -285,8 +296,15 @@ def _pairs(
     """Return which sensors (rows) read which others, (n, n), of which some are neighbours."""
     n = len(near)
     if not isinstance(crosstalk, str):
+        asked = np.array(crosstalk, dtype=object)
+        if asked.size and asked.shape[1:] != (2,):
+            raise InputError(
+                f"The crosstalk is {crosstalk!r}.",
+                why="Each pair is the reading sensor and the one that it reads of.",
+                cure='Give a list of pairs of names, or "auto", "none", "nearest" or "full".',
+            )
         pairs = np.zeros((n, n), bool)
-        for row, column in crosstalk:
+        for row, column in asked:
             require_names("There is no sensor", [row], scan.sensors)
             others = [name for name in scan.sensors if name != row]
             require_names("There is no other sensor", [column], others)
@@ -330,7 +348,9 @@ def _begun(
     total = np.where(used, high.sum(axis=1), np.nan)
     centres = high @ presses.places.T / total[:, None]
     layout = centres
-    if scan.layout is not None:
+    if scan.layout is None:
+        _guess_dead(centres, presses.axes, used)
+    else:
         layout, _ = fitted_layout(scan.layout, centres[used], used)
         # Neighbours may read what a dead sensor does not tell.
         centres = np.where(used[:, None], centres, layout)
@@ -355,6 +375,19 @@ def _begun(
     deviation = np.where(used, _AT_FIRST * found.peak, 1.0)
     nothing = np.zeros((n, n))
     return model, state, Noise(deviation**2, nothing, nothing)
+
+
+def _guess_dead(centres: FloatArray, axes: tuple[int, ...], used: BoolArray) -> None:
+    """Fill in the centres of dead sensors of a row of even pitch, in the order of their names."""
+    number = np.arange(used.size)
+    if len(axes) > 1 or used.sum() < 3:
+        return
+    along = centres[:, axes[0]]
+    start, pitch = np.polynomial.polynomial.polyfit(number[used], along[used], 1)
+    even = start + pitch * number
+    if np.max(abs(along - even)[used]) < _UNEVEN * abs(pitch):
+        along[~used] = even[~used]
+        centres[~used, 1 - axes[0]] = 0.0
 
 
 def _own_fit(fit: JointFit, *, shapes: bool) -> JointFit:
@@ -384,6 +417,11 @@ def _effects(prepared: Prepared, fit: JointFit) -> Arrays:
     kernel = fit.posterior.kernel
     changes = reference_sensitivities([scan], [fit.reference])
     products = {name: change[0] * kernel for name, change in changes.items()}
+    slip, shear = scan.base_slip_uncertainty, scan.shear_sensitivity_uncertainty
+    for name, size in (("base_slip", slip), ("shear_sensitivity", shear)):
+        if size:
+            by_one, _ = assumed_of_film(scan, fit.reference)[name]
+            products[name] = size * by_one * kernel
     scale = scan.position_scale_uncertainty
     if scale:
         # All distances are larger: the transform of a function of them is dilated.

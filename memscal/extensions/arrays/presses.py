@@ -103,12 +103,16 @@ def sorted_readings(scan: Scan, places: FloatArray, u: FloatArray) -> Sorted:
         top = places[:, inside[np.argmax(abs(values - np.median(values)))]]
         distance = np.hypot(*(places[:, inside] - top[:, None]))
         count = max(int(_OUTERMOST * inside.size), _FEWEST)
-        outermost = np.argsort(distance)[-count:]
-        # A drift across the scan is no peak.
+        falling = np.argsort(-distance)
+        outermost = np.sort(falling[:count])
+        # A drift across the scan is no peak: it is that of the half farther from the peak.
+        far = falling[: max(inside.size // 2, _FEWEST)]
         columns = np.vstack([np.ones(inside.size), places[:, inside]]).T
-        level = values - columns @ np.linalg.lstsq(columns, values)[0]
+        level = values - columns @ np.linalg.lstsq(columns[far], values[far])[0]
         peak = np.sort(level)[-3] - np.median(level[outermost])
-        numbers[:, i] = peak, np.median(values[outermost]), level[outermost].std()
+        # Steps tell the noise also where a peak begins.
+        noise = np.sqrt(np.mean(np.diff(level[outermost]) ** 2) / 2)
+        numbers[:, i] = peak, np.median(values[outermost]), noise
         clipped = inside[_clipped(values, numbers[2, i])]
         if scan.reading_high is None and clipped.size:
             keep[i, clipped] = False

@@ -37,7 +37,7 @@ def model(axes):
     reference = RadialSpectrum(wavenumbers, np.exp(-1e-3 * k))
     pairs = np.array([[0, 1, 0, 1], [1, 0, 1, 0], [0, 0, 0, 1], [0, 0, 0, 0]], bool)
     own = np.stack([-1e-7 * (k * 5e-4) ** 2 * gaussian_transfer(k, 5e-4)], axis=1)
-    layout = Layout.of(presses, pairs, 1, 1)
+    layout = Layout.of(presses, pairs, pairs, 1, 1)
     waves = Waves.of(reference, 10e-3)
     state = ArrayState(
         gain=np.array([0.9, 1.0, 1.1, 1.0]),
