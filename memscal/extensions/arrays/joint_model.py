@@ -139,17 +139,14 @@ class JointModel:
     def signals(self, state: ArrayState) -> tuple[FloatArray, FloatArray]:
         """What each sensor would read without crosstalk, (m, t), and its slope by the distance."""
         radius, _ = self.distances(state)
-        own = self.own @ state.own.T
-        kernels = state.kernel[:, None] + own
+        kernels = state.kernel + state.own @ self.own.T
         signals = np.empty(radius.shape)
         slopes = np.empty(radius.shape)
-        common = not state.own.any()
-        profiles = self.waves.profiles(kernels[:, :1] if common else kernels)
         for j, distance in enumerate(radius):
-            column = 0 if common else j
+            profile = self.waves.profiles(kernels[j])
             factor = state.gain[j] * self.presses.load
-            signals[j] = factor * profiles(distance)[:, column]
-            slopes[j] = factor * profiles(distance, 1)[:, column]
+            signals[j] = factor * profile(distance)
+            slopes[j] = factor * profile(distance, 1)
         return signals, slopes
 
     def predicted(self, state: ArrayState) -> FloatArray:
@@ -170,38 +167,27 @@ class JointModel:
         q = kernels.shape[1]
         radius, towards = self.distances(state)
         signals, slopes = self.signals(state)
-        moved = [slopes * towards[axis] for axis in presses.axes]
-        profiles = self.waves.profiles(np.hstack([kernels, self.own]))
-        factors = state.gain[:, None] * presses.load
-        by_kernel = [f[:, None] * profiles(r) for f, r in zip(factors, radius, strict=True)]
+        by_kernel = self.waves.profiles(np.hstack([kernels, self.own]))(radius)
+        by_kernel *= (state.gain[:, None] * presses.load)[:, :, None]
+        # By what is each sensor's own, whichever sensors read it.
+        moved = slopes * towards[list(presses.axes)]
+        sources = np.vstack([signals[None], moved, np.moveaxis(by_kernel[..., q:], 2, 0)])
+        numbers = np.vstack([layout.gains, layout.centres, layout.own.T])
         common = self._common(noise, self.press_errors(state))
         gram = np.zeros((1 + p + q, 1 + p + q))
         shared = np.zeros((len(common), presses.load.size, 1 + p + q))
-        kernel_places = np.arange(1 + p, 1 + p + q)
         for i in np.flatnonzero(presses.used):
             row = state.crosstalk[i]
             near = np.flatnonzero((row != 0) | (layout.crosstalk[i] >= 0))
-            names = [np.zeros(1, np.intp), 1 + layout.drift[i]]
-            columns = [data[i][:, None], presses.drift]
-            of_all = np.zeros((presses.load.size, q))
-            for j in near:
-                whole = by_kernel[j]
-                of_all += row[j] * whole[:, :q]
-                parts = [signals[j] * row[j], *(row[j] * change[j] for change in moved)]
-                places = [layout.gains[j], *layout.centres[:, j]]
-                if i != j:
-                    parts.append(signals[j])
-                    places.append(layout.crosstalk[i, j])
-                parts += list(row[j] * whole[:, q:].T)
-                places += list(layout.own[j])
-                known = np.array(places) >= 0
-                columns.append(np.stack(parts, axis=1)[:, known])
-                names.append(1 + np.array(places)[known])
-            columns.append(of_all)
-            names.append(kernel_places)
+            read = row[near, None] * sources[:, near]
+            changes = np.vstack([presses.drift.T, signals[near], *read])
+            of_all = np.tensordot(row[near], by_kernel[near, :, :q], 1)
+            places = [layout.drift[i], layout.crosstalk[i, near], numbers[:, near].ravel()]
+            parameters = np.concatenate(places)
+            known = parameters >= 0
             root = presses.keep[i] / np.sqrt(noise.own[i])
-            block = root[:, None] * np.hstack(columns)
-            index = np.concatenate(names)
+            block = root[:, None] * np.column_stack([data[i], changes[known].T, of_all])
+            index = np.concatenate([[0], 1 + parameters[known], np.arange(1 + p, 1 + p + q)])
             gram[np.ix_(index, index)] += block.T @ block
             for level, change in zip(shared, common, strict=True):
                 level[:, index] += (root * change[i])[:, None] * block
