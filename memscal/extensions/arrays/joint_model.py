@@ -60,21 +60,20 @@ class Layout:
     Those of sensors that are not used are -1.
     """
 
+    count: int
     gains: IndexArray  # (m,): -1 of the largest, too
     centres: IndexArray  # (axes, m)
     crosstalk: IndexArray  # (m, m): -1 where not estimated
     drift: IndexArray  # (m, d)
     own: IndexArray  # (m, o)
-    count: int
 
     @classmethod
-    def of(cls, presses: Presses, pairs: BoolArray, largest: int, own: int) -> Layout:
-        """Count the parameters of an array with crosstalk of pairs (m, m)."""
+    def of(cls, presses: Presses, scaled: BoolArray, pairs: BoolArray, own: int) -> Layout:
+        """Count the parameters of an array with gains (m,) and crosstalk (m, m) of some."""
         used = presses.used
         m = used.size
-        some = np.arange(m) != largest
         free = [
-            used & some,
+            scaled,
             np.broadcast_to(used, (len(presses.axes), m)),
             pairs,
             np.broadcast_to(used[:, None], (m, presses.drift.shape[1])),
@@ -87,8 +86,7 @@ class Layout:
             numbers[mask] = np.arange(count, count + mask.sum())
             count += int(mask.sum())
             places.append(numbers)
-        gains, centres, crosstalk, drift, changes = places
-        return cls(gains, centres, crosstalk, drift, changes, count)
+        return cls(count, *places)
 
     def moved(self, state: ArrayState, change: FloatArray, axes: tuple[int, ...]) -> ArrayState:
         """Return a state changed by the parameters (p,)."""
@@ -126,6 +124,12 @@ class JointModel:
         return departure_basis(self.gaussian).kernels(self.forward.k)[:, :2]
 
     @property
+    def start(self) -> FloatArray:
+        """The Gaussian by its combination of the waves, (f,), in V/Pa."""
+        kernel = self.waves.mix @ self.gaussian_kernels[:, 0]
+        return np.asarray(self.gaussian.conversion_constant * kernel)
+
+    @property
     def own(self) -> FloatArray:
         """These changes by their combinations of the waves, (f, o)."""
         return self.waves.mix @ self.own_kernels
@@ -154,20 +158,23 @@ class JointModel:
         signals, _ = self.signals(state)
         return state.crosstalk @ signals + state.drift @ self.presses.drift.T
 
-    def information(
-        self, state: ArrayState, noise: Noise, kernels: FloatArray, data: FloatArray
-    ) -> FloatArray:
-        """Linearise about a state, with kernels (f, q) of all sensors, for residuals (m, t).
+    def residual(self, state: ArrayState) -> FloatArray:
+        """Readings that are not explained, (m, t), in V; zero where not kept."""
+        presses = self.presses
+        return np.where(presses.keep, presses.u - self.predicted(state), 0.0)
 
-        Weighted sums of products of the residuals, of p parameters and of the kernels: one matrix.
+    def information(self, state: ArrayState, noise: Noise, data: FloatArray) -> FloatArray:
+        """Linearise about a state, with any kernel (f,) of all sensors, for residuals (m, t).
+
+        Weighted sums of products of the residuals, of p parameters and of the kernel: one matrix.
         """
         presses = self.presses
         layout = self.layout
         p = layout.count
-        q = kernels.shape[1]
+        q = len(self.waves.mix)
         radius, towards = self.distances(state)
         signals, slopes = self.signals(state)
-        by_kernel = self.waves.profiles(np.hstack([kernels, self.own]))(radius)
+        by_kernel = self.waves.profiles(np.hstack([np.eye(q), self.own]))(radius)
         by_kernel *= (state.gain[:, None] * presses.load)[:, :, None]
         # By what is each sensor's own, whichever sensors read it.
         moved = slopes * towards[list(presses.axes)]
