@@ -198,9 +198,7 @@ class JointModel:
             gram[np.ix_(index, index)] += block.T @ block
             for level, change in zip(shared, common, strict=True):
                 level[:, index] += (root * change[i])[:, None] * block
-        if len(common):
-            gram -= self._in_common(common, noise, shared)
-        return gram
+        return gram - self._in_common(common, noise, shared)
 
     def by_press(self, state: ArrayState) -> FloatArray:
         """Derivatives of kept readings by the place along the scan and by ln load, (2, m, t)."""
@@ -217,12 +215,10 @@ class JointModel:
         """What one deviation of each thing in common to a press does, (c, m, t), in V."""
         board = self.presses.board
         deviation = np.sqrt(np.diag(noise.common))
-        boards = [
-            np.broadcast_to((deviation * (board == i))[:, None], errors.shape[1:])
-            for i in np.unique(board)
-        ]
-        stated = [change for change in [*boards, *errors] if change.any()]
-        return np.reshape(stated, (len(stated), *errors.shape[1:]))
+        boards = deviation * np.equal.outer(np.unique(board), board)
+        at_each = np.repeat(boards[:, :, None], errors.shape[2], axis=2)
+        changes = np.concatenate([at_each, errors])
+        return changes[changes.any(axis=(1, 2))]
 
     def _in_common(self, common: FloatArray, noise: Noise, shared: FloatArray) -> FloatArray:
         """What readings of a press that share their errors tell less, by Woodbury's identity."""

@@ -32,7 +32,7 @@ def measured_array(scan: Scan) -> SensorArray:
 
     u = scan.u_zz.reshape(len(scan.sensors), -1)
     seen: BoolArray = np.isfinite(u)
-    used: BoolArray = np.logical_or.reduce(seen, axis=1)
+    used: BoolArray = seen.any(axis=1)
     used &= True if scan.used is None else scan.used
     # A press is one of all sensors.
     kept = seen[used].all(axis=0)
@@ -56,7 +56,8 @@ def measured_array(scan: Scan) -> SensorArray:
         spline = RectBivariateSpline(x, y, field, s=variance * np.sum(1 / counts))
         predicted[one] = spline(x, y).ravel()
         root[one] = np.sqrt(variance * spline.get_coeffs().size / u.shape[1])
-    at_x, at_y = (floats(grid.ravel()) for grid in np.meshgrid(x, y, indexing="ij"))
+    at_x = np.repeat(x, y.size)
+    at_y = np.tile(y, x.size)
     rim = np.isin(at_x, x[[0, -1]]) | np.isin(at_y, y[[0, -1]])
     around = abs(np.median(mean[:, rim], axis=1))
     messages = _offset(scan, used & (around > _OFFSET * size))

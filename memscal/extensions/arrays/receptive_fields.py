@@ -138,8 +138,7 @@ class ReceptiveFields:
 
     def _offsets(self, places: FloatArray) -> FloatArray:
         """Return places from the centre of each sensor, (2, m, n)."""
-        axes = zip(places.T, self.centres.T, strict=True)
-        return np.stack([np.subtract.outer(place, centre) for place, centre in axes])
+        return np.subtract(places.T[..., None], self.centres.T[:, None], order="C")
 
     def _looked_up(
         self, offsets: FloatArray, force: FloatArray | float, *, columns: int
