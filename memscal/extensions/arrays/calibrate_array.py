@@ -188,10 +188,6 @@ def calibrate_array(
         fit, compared = compared, fit
     array = _array(opened, prepared, found, fit)
     checks, failing = array_checks(fit, compared, array, found)
-    messages = [
-        *failed_check_messages(checks),
-        *array_messages(opened, prepared, found, fit, failing),
-    ]
     process = Process.of_now(
         configuration={
             "kernel": kernel,
@@ -200,7 +196,10 @@ def calibrate_array(
             "rod_friction": rod_friction,
             "override": prepared.overridden,
         },
-        messages=tuple(messages),
+        messages=(
+            *failed_check_messages(checks),
+            *array_messages(opened, prepared, found, fit, failing),
+        ),
         input_scan=opened.source,
     )
     return ArrayCalibration(replace(array, checks=checks, failing=failing, process=process))
@@ -243,7 +242,7 @@ def _presses(scan: Scan, prepared: Prepared, found: Sorted) -> Presses:
     if scan.kind == "repeats" and not scan.position_errors_by_repeat:
         # An error that all repeats share is not less in their mean.
         place_errors = place_errors * np.sqrt(scan.shape[0])
-    axes = (0, 1) if single.planar else ((0,) if single.direction == "x" else (1,))
+    axes = (0, 1) if single.planar else ("xy".index(single.direction),)
     passes = scan.passes.ravel()
     if np.bincount(passes).min() < MINIMUM_POSITIONS:
         passes = np.zeros_like(passes)
@@ -384,18 +383,16 @@ def _effects(prepared: Prepared, fit: JointFit) -> Arrays:
 def _array(scan: Scan, prepared: Prepared, found: Sorted, fit: JointFit) -> SensorArray:
     """Return the calibrated array, with NaN for sensors that are not used."""
     used = found.used
-    presses = fit.model.presses
     inputs = _effects(prepared, fit)
     columns = np.column_stack([fit.posterior.root, *inputs.values()])
     numbers = array_numbers(fit, columns)
     modes, of_modes = kernel_modes(fit, numbers)
     layout = fit.model.layout
     near = (layout.crosstalk >= 0) & used
-    of_centres = np.zeros((2, used.size, columns.shape[1]))
-    of_centres[list(presses.axes)] = taken(columns, layout.centres)
+    of_centres = taken(columns, layout.centres)
     everything = np.vstack([numbers.of_a, *of_centres, columns[layout.crosstalk[near]], of_modes])
     count = fit.posterior.root.shape[1]
-    effects = {name: everything[:, count + i] for i, name in enumerate(inputs)}
+    effects = dict(zip(inputs, everything.T[count:], strict=True))
     n = used.size
     for name, share in _scalings(prepared).items():
         # What scales all readings alike scales A.
@@ -403,8 +400,7 @@ def _array(scan: Scan, prepared: Prepared, found: Sorted, fit: JointFit) -> Sens
         effects[name][:n] = -share
     state = fit.state
     missing = np.where(used, 0.0, np.nan)
-    centres = np.full((n, 2), np.nan)
-    centres[:, presses.axes] = state.centres[:, presses.axes] + missing[:, None]
+    told = np.isin([0, 1], fit.model.presses.axes)
     k = fit.model.forward.k
     widths = [nearest_width(k, kernel, fit.model.gaussian.sigma) for kernel in numbers.kernels]
     first = prepared.scans[0]
@@ -416,7 +412,7 @@ def _array(scan: Scan, prepared: Prepared, found: Sorted, fit: JointFit) -> Sens
         sensors=tuple(scan.sensors),
         used=used,
         conversion_constants=np.exp(numbers.log_a) + missing,
-        centres=centres,
+        centres=np.where(told, state.centres, np.nan) + missing[:, None],
         crosstalk=np.where(near, state.crosstalk, np.eye(n)),
         estimated=near,
         gaussian_sigmas=np.resize(widths, n) + missing,

@@ -38,8 +38,7 @@ from memscal.model.arrays import FloatArray, array_record, floats
 SPREADS = (0.0005, 0.001, 0.002, 0.005, 0.01, 0.02, 0.05)
 WIDEST = SPREADS[-1]
 #: Standard deviation of what is a sensor's own: ln width, and departures over the Gaussian's size.
-OWN_WIDTH = 0.05
-_OWN_SHAPE = 0.05
+_OWN = 0.05
 #: Rounds of a fit, and of the first one, after which the noise is known.
 _MOST_ROUNDS = 12
 _FIRST_ROUNDS = 3
@@ -85,7 +84,7 @@ class JointFit:
     def by_widest(self) -> JointFit:
         """The same by the widest prior of the crosstalk."""
         change = self.widest.change - self.posterior.change
-        state = self.model.layout.moved(self.state, change, self.model.presses.axes)
+        state = self.model.layout.moved(self.state, change)
         return replace(self, state=state, posterior=self.widest)
 
     @property
@@ -101,9 +100,8 @@ def prior_precision(layout: Layout, spread: float) -> FloatArray:
     # Of t^2 1 + m^2 1 1', by Sherman and Morrison.
     alike = WIDEST**2 / (spread**2 + places.size * WIDEST**2)
     precision[np.ix_(places, places)] = (np.eye(places.size) - alike) / spread**2
-    for i, places in enumerate(layout.own.T):
-        own = places[places >= 0]
-        precision[own, own] = (_OWN_SHAPE if i else OWN_WIDTH) ** -2
+    own = layout.own[layout.own >= 0]
+    precision[own, own] = _OWN**-2
     return precision
 
 
@@ -136,8 +134,8 @@ def noise_of(model: JointModel, state: ArrayState) -> Noise:
     presses = model.presses
     residual = model.residual(state)
     errors = model.press_errors(state)
-    count = np.maximum(presses.keep.sum(axis=1), 1)
     both = np.maximum(presses.keep.astype(float) @ presses.keep.T, 1)
+    count = np.diag(both)
     of_presses = np.sum(errors @ errors.mT, axis=0) / both
     freedom = np.maximum(1 - model.layout.count / presses.used.sum() / count, 0.1)
     square = residual @ residual.T / both / np.sqrt(np.outer(freedom, freedom)) - of_presses
@@ -152,8 +150,7 @@ def noise_of(model: JointModel, state: ArrayState) -> Noise:
     if presses.stated is not None:
         stated = np.sum(presses.stated**2, axis=1, where=presses.keep) / count
         total = np.maximum(total, stated)
-    largest = np.ptp(presses.u, axis=1)
-    least = np.maximum(_LEAST_OWN * total, (_ROUNDING * largest) ** 2)
+    least = np.maximum(_LEAST_OWN * total, (_ROUNDING * np.ptp(presses.u, axis=1)) ** 2)
     least[~presses.used] = 1.0
     return Noise(np.maximum(total - np.diag(common), least), common, of_presses)
 
@@ -191,9 +188,9 @@ def fit_shape(
         best = likeliest.posterior()
         longest = abs(taken(best.change, model.layout.centres)).max() / model.gaussian.width
         share = _LONGEST / max(longest, _LONGEST)
-        moved = model.layout.moved(state, share * best.change, model.presses.axes)
+        moved = model.layout.moved(state, share * best.change)
         state = replace(moved, kernel=model.waves.mix @ best.kernel)
-        size = np.sqrt(np.sum(best.root[: model.layout.count] ** 2, axis=1))
+        size = np.linalg.norm(best.root[: model.layout.count], axis=1)
         if np.all(abs(best.change) < _SETTLED * size):
             break
     widest = weighed[-1].posterior()
@@ -218,17 +215,14 @@ class Weighed:
         kernels = basis.kernels(self.weighing.reduced.model.k)
         # The parameters given a kernel: what they are without it, less what it explains of them.
         by_kernel = self.by_others[:, 1:] @ (self.mix @ kernels)
-        of_kernel = square_root(weighed.covariance)
-        count = len(by_kernel)
-        none = np.zeros((len(kernels), count))
-        root = np.block([[self.root, -by_kernel @ of_kernel], [none, kernels @ of_kernel]])
+        both = np.vstack([-by_kernel, kernels])
+        below = ((0, len(kernels)), (0, 0))
         kernel_gain = weighed.gain.dense() @ self.columns[:, 1:]
-        own_gain = self.by_others[:, 1:] - by_kernel @ kernel_gain
         return Posterior(
             change=self.by_others[:, 0] - by_kernel @ weighed.mean,
             kernel=basis.conversion_constant * kernels[:, 0] + kernels @ weighed.mean,
-            root=root,
-            gain=np.vstack([own_gain, kernels @ kernel_gain]),
+            root=np.hstack([np.pad(self.root, below), both @ square_root(weighed.covariance)]),
+            gain=np.pad(self.by_others[:, 1:], below) + both @ kernel_gain,
         )
 
 

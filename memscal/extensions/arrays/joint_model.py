@@ -62,7 +62,7 @@ class Layout:
 
     count: int
     gains: IndexArray  # (m,): -1 of the largest, too
-    centres: IndexArray  # (axes, m)
+    centres: IndexArray  # (2, m): -1 across a line, too
     crosstalk: IndexArray  # (m, m): -1 where not estimated
     drift: IndexArray  # (m, d)
     own: IndexArray  # (m, o)
@@ -74,7 +74,7 @@ class Layout:
         m = used.size
         free = [
             scaled,
-            np.broadcast_to(used, (len(presses.axes), m)),
+            used & np.isin([[0], [1]], presses.axes),
             pairs,
             np.broadcast_to(used[:, None], (m, presses.drift.shape[1])),
             np.broadcast_to(used[:, None], (m, own)),
@@ -88,14 +88,12 @@ class Layout:
             places.append(numbers)
         return cls(count, *places)
 
-    def moved(self, state: ArrayState, change: FloatArray, axes: tuple[int, ...]) -> ArrayState:
+    def moved(self, state: ArrayState, change: FloatArray) -> ArrayState:
         """Return a state changed by the parameters (p,)."""
-        centres = state.centres.copy()
-        centres[:, axes] += taken(change, self.centres).T
         return replace(
             state,
             gain=state.gain * np.exp(taken(change, self.gains)),
-            centres=centres,
+            centres=state.centres + taken(change, self.centres).T,
             crosstalk=state.crosstalk + taken(change, self.crosstalk),
             drift=state.drift + taken(change, self.drift),
             own=state.own + taken(change, self.own),
@@ -177,8 +175,9 @@ class JointModel:
         by_kernel = self.waves.profiles(np.hstack([np.eye(q), self.own]))(radius)
         by_kernel *= (state.gain[:, None] * presses.load)[:, :, None]
         # By what is each sensor's own, whichever sensors read it.
-        moved = slopes * towards[list(presses.axes)]
-        sources = np.vstack([signals[None], moved, np.moveaxis(by_kernel[..., q:], 2, 0)])
+        sources = np.vstack(
+            [signals[None], slopes * towards, np.moveaxis(by_kernel[..., q:], 2, 0)]
+        )
         numbers = np.vstack([layout.gains, layout.centres, layout.own.T])
         common = self._common(noise, self.press_errors(state))
         gram = np.zeros((1 + p + q, 1 + p + q))

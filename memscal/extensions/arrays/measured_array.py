@@ -32,7 +32,7 @@ def measured_array(scan: Scan) -> SensorArray:
 
     u = scan.u_zz.reshape(len(scan.sensors), -1)
     seen: BoolArray = np.isfinite(u)
-    used: BoolArray = seen.any(axis=1)
+    used: BoolArray = np.logical_or.reduce(seen, axis=1)
     used &= True if scan.used is None else scan.used
     # A press is one of all sensors.
     kept = seen[used].all(axis=0)

@@ -63,7 +63,7 @@ def test_information_is_that_of_brute_force(axes):
     for i in range(joint.layout.count):
         step = np.zeros(joint.layout.count)
         step[i] = 1e-6 * (1e-3 if i in joint.layout.centres else 1.0)
-        ends = [joint.predicted(joint.layout.moved(state, s * step, axes)) for s in (1, -1)]
+        ends = [joint.predicted(joint.layout.moved(state, s * step)) for s in (1, -1)]
         columns.append((ends[0] - ends[1]) / (2 * step[i]))
     for column in np.eye(len(joint.waves.mix)):
         added = replace(state, kernel=state.kernel + column)
