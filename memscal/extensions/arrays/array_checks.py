@@ -67,7 +67,6 @@ def _of_all(array: ArrayData, found: Sorted) -> Iterator[Failing]:
         ),
         dead,
     )
-    clipped = np.flatnonzero(found.at_ceiling)
     yield (
         check(
             "saturation",
@@ -76,7 +75,7 @@ def _of_all(array: ArrayData, found: Sorted) -> Iterator[Failing]:
             "Number of readings at a ceiling. They are left out, the others of their sensors "
             "count: lower gain or load.",
         ),
-        clipped,
+        np.flatnonzero(found.at_ceiling),
     )
     places = array.places[array.used]
     pressed = np.stack([array.readings.x, array.readings.y], axis=1)

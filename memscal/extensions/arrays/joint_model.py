@@ -71,13 +71,12 @@ class Layout:
     def of(cls, presses: Presses, scaled: BoolArray, pairs: BoolArray, own: int) -> Layout:
         """Count the parameters of an array with gains (m,) and crosstalk (m, m) of some."""
         used = presses.used
-        m = used.size
         free = [
             scaled,
             used & np.isin([[0], [1]], presses.axes),
             pairs,
-            np.broadcast_to(used[:, None], (m, presses.drift.shape[1])),
-            np.broadcast_to(used[:, None], (m, own)),
+            np.tile(used[:, None], presses.drift.shape[1]),
+            np.tile(used[:, None], own),
         ]
         places = []
         count = 0

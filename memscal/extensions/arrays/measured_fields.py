@@ -42,7 +42,7 @@ class MeasuredFields:
     @property
     def centres(self) -> FloatArray:
         """Ends of the raster, (2, 2), in m: the sensors' own places do not matter."""
-        return floats([[axis[i] for axis in self.nodes] for i in (0, -1)])
+        return np.transpose([axis[[0, -1]] for axis in self.nodes])
 
     @property
     def scale(self) -> float:
