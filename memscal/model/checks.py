@@ -254,7 +254,7 @@ def outlier_check(weights: "FloatArray", where: str) -> QualityCheck:
 
 
 def added_check(name: str, fall: float, count: int, meaning: str) -> QualityCheck:
-    """Return the check of the fall of chi-square by columns that are added to a model."""
+    """Return the check of a chi-square, or of its fall by columns that are added to a model."""
     from scipy.special import chdtrc
 
     return check(name, fall, chi_square_limit(count), meaning, float(chdtrc(count, fall)))

@@ -17,8 +17,8 @@ from memscal.model.checks import (
     FALSE_ALARM,
     Message,
     QualityCheck,
+    added_check,
     check,
-    chi_square_limit,
     override_messages,
     uncertainty_unstated_messages,
 )
@@ -61,10 +61,8 @@ def array_checks(
 ) -> tuple[tuple[QualityCheck, ...], dict[str, tuple[str, ...]]]:
     """Check a fit, against one with own widths or shapes, or a common one; name failing sensors."""
     names = np.array(array.sensors)
-    failing = {}
     results = [*_of_all(array, found), *_of_fit(fit, compared, array)]
-    for one, numbers in results:
-        failing[one.name] = tuple(names[numbers].tolist())
+    failing = {one.name: tuple(names[numbers].tolist()) for one, numbers in results}
     return tuple(one for one, _ in results), failing
 
 
@@ -80,7 +78,6 @@ def _of_all(array: ArrayData, found: Sorted) -> Iterator[Failing]:
         ),
         dead,
     )
-    clipped = np.flatnonzero(found.at_ceiling)
     yield (
         check(
             "saturation",
@@ -89,16 +86,13 @@ def _of_all(array: ArrayData, found: Sorted) -> Iterator[Failing]:
             "Number of readings at a ceiling. They are left out, the others of their sensors "
             "count: lower gain or load.",
         ),
-        clipped,
+        np.flatnonzero(found.at_ceiling),
     )
     places = array.places[array.used]
     pressed = np.stack([array.readings.x, array.readings.y], axis=1)
-    axes = [axis for axis in (0, 1) if np.ptp(pressed[:, axis]) > 0]
-    margins = np.minimum(
-        places[:, axes] - pressed[:, axes].min(axis=0),
-        pressed[:, axes].max(axis=0) - places[:, axes],
-    ).min(axis=1)
-    short = _BEYOND - margins / array.film.thickness
+    margins = np.minimum(places - pressed.min(axis=0), pressed.max(axis=0) - places)
+    along = np.ptp(pressed, axis=0) > 0
+    short = _BEYOND - margins[:, along].min(axis=1) / array.film.thickness
     yield (
         check(
             "ends_covered",
@@ -137,17 +131,16 @@ def _layout(array: ArrayData) -> Failing:
     beside = np.sum((turned - array.places)[used] ** 2, axis=1, where=~known)
     squares += beside / (stated**2 + (_BESIDE * array.gaussian_sigmas[used]) ** 2)
     axes = known.sum()
-    degrees = axes * (used.size - 2)
+    degrees = int(axes) * (used.size - 2)
     return (
-        check(
+        added_check(
             "layout",
             squares.sum(),
-            chi_square_limit(degrees),
+            degrees,
             "Chi-square of the centres against the layout, which may be shifted, turned by up to "
             "30 degrees and scaled by up to 50 %. A failure means that sensors are elsewhere, or "
             "beside a single line, which needs a raster, or that names, units or axes of the "
             "layout are wrong.",
-            float(chdtrc(degrees, squares.sum())),
         ),
         used[squares > chdtri(axes, FALSE_ALARM / used.size)],
     )
@@ -232,16 +225,14 @@ def _common_kernel(own: JointFit) -> Failing:
     data = left[widths, 0] * scale[0] + information @ (before * scale[widths])
     # A common width is one of the common shape.
     square = data @ np.linalg.pinv(information, rcond=1e-8, hermitian=True) @ data
-    degrees = used.size - 1
     z = abs(own.state.own[used, 0]) / np.linalg.norm(own.posterior.root[places], axis=1)
     return (
-        check(
+        added_check(
             "common_kernel",
             square,
-            chi_square_limit(degrees),
+            used.size - 1,
             "Fall of chi-square by widths of the sensors' own, where the common shape is free. A "
             "failure means that one G does not describe all of them.",
-            float(chdtrc(degrees, square)),
         ),
         used[z > -ndtri(FALSE_ALARM / z.size)],
     )

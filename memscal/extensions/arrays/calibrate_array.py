@@ -12,7 +12,7 @@ import numpy as np
 from memscal.calibration.prepare import Prepared, Reference, Request, prepare
 from memscal.deconvolution.division import WhiteNoise
 from memscal.errors import FitError, InputError, counted, require_names
-from memscal.estimation.departures import SHAPES
+from memscal.estimation.departures import SHAPES, Shape
 from memscal.estimation.forward import ForwardModel
 from memscal.estimation.gaussian import fit_gaussian_to_points
 from memscal.estimation.influences import assumed_of_film
@@ -177,29 +177,21 @@ def calibrate_array(
         accept_altered=accept_altered,
         relative=False,
     )
-    singles = [opened.of_sensor(i) for i in range(len(opened.sensors))]
-    places = np.stack([values.ravel() for values in singles[0].positions])
-    u = opened.u_zz.reshape(len(singles), -1)
-    found = sorted_readings(opened, places, u)
+    found = sorted_readings(opened)
     if not found.used.any():
         raise FitError(
-            f"None of the {counted(len(singles), 'sensors')} of the array answers the rod.",
+            f"None of the {counted(len(opened.sensors), 'sensors')} of the array answers the rod.",
             cure="Look at the readings; press on the sensors.",
         )
-    strongest = singles[int(np.argmax(np.where(found.used, found.peak, -np.inf)))]
-    prepared = prepare((strongest,), request)
-    presses = _presses(opened, prepared, found, places, u)
+    prepared = prepare((opened.of_sensor(found.largest),), request)
+    presses = _presses(opened, prepared, found)
     fit = fit_array(*_begun(opened, prepared, found, presses, crosstalk))
-    own = kernel == "own" or (kernel == "auto" and strongest.planar)
-    compared = _own_fit(fit, shapes=own)
+    own = kernel == "own" or (kernel == "auto" and opened.planar)
+    compared = _own_fit(fit, _OWN_SHAPES if own else ())
     if kernel == "own" or (own and compared.log_evidence > fit.log_evidence):
         fit, compared = compared, fit
     array = _array(opened, prepared, found, fit)
     checks, failing = array_checks(fit, compared, array, found)
-    messages = [
-        *failed_check_messages(checks),
-        *array_messages(opened, prepared, found, fit, failing),
-    ]
     process = Process.of_now(
         configuration={
             "kernel": kernel,
@@ -208,7 +200,10 @@ def calibrate_array(
             "rod_friction": rod_friction,
             "override": prepared.overridden,
         },
-        messages=tuple(messages),
+        messages=(
+            *failed_check_messages(checks),
+            *array_messages(opened, prepared, found, fit, failing),
+        ),
         input_scan=opened.source,
     )
     return ArrayCalibration(replace(array, checks=checks, failing=failing, process=process))
@@ -239,9 +234,7 @@ def _opened(scan: Scan | str | PathLike[str], *, accept_altered: bool) -> Scan:
     return opened
 
 
-def _presses(
-    scan: Scan, prepared: Prepared, found: Sorted, places: FloatArray, u: FloatArray
-) -> Presses:
+def _presses(scan: Scan, prepared: Prepared, found: Sorted) -> Presses:
     """Return the presses of all places, with the readings of the used sensors."""
     single = prepared.scans[0]
     if len(prepared.scans) > 1 and single.set_up.film.law != LINEAR:
@@ -250,17 +243,17 @@ def _presses(
             why="The stress then changes its shape with the load.",
             cure="Press with one load, or state film_law='linear' (--film-law linear).",
         )
-    load = scan.of_sensor(0).normal_load
-    loads = np.full(u.shape[1], single.stated_load) if load is None else load.ravel()
-    errors = np.zeros(u.shape[1])
-    if scan.normal_load_errors is not None:
-        errors = np.ravel(scan.normal_load_errors) / loads
+
+    def of_presses(stated: FloatArray | None, otherwise: float) -> FloatArray:
+        return np.broadcast_to(otherwise if stated is None else stated, scan.shape).ravel()
+
+    loads = of_presses(scan.normal_load, single.stated_load)
     keep = found.keep & np.isfinite(loads)
-    x_errors = np.zeros(scan.x.size) if scan.x_errors is None else scan.x_errors
+    place_errors = of_presses(scan.x_errors, 0.0)
     if scan.kind == "repeats" and not scan.position_errors_by_repeat:
         # An error that all repeats share is not less in their mean.
-        x_errors = x_errors * np.sqrt(scan.shape[0])
-    axes = (0, 1) if single.planar else ((0,) if single.direction == "x" else (1,))
+        place_errors = place_errors * np.sqrt(scan.shape[0])
+    axes = (0, 1) if single.planar else ("xy".index(single.direction),)
     passes = scan.passes.ravel()
     if np.bincount(passes).min() < MINIMUM_POSITIONS:
         passes = np.zeros_like(passes)
@@ -268,24 +261,24 @@ def _presses(
     # By so few readings a sensor has no baseline in a pass.
     keep &= (keep.astype(int) @ of_pass.T >= MINIMUM_POSITIONS) @ of_pass
     # Each pass has a baseline and a drift.
-    along = places[list(axes)]
+    along = found.places[list(axes)]
     low = along.min(axis=1, keepdims=True)
     half = np.ptp(along, axis=1, keepdims=True) / 2
     straight = np.vstack([np.ones_like(passes), (along - low) / half - 1])
     drift = np.vstack([straight * one for one in of_pass])
     stated = scan.u_zz_errors
-    board = np.zeros(len(u), np.intp) if scan.board is None else scan.board
+    board = np.zeros(len(found.u)) if scan.board is None else scan.board
     return Presses(
-        places=places,
-        load=np.where(np.isfinite(loads), loads, 0.0),
-        u=np.where(keep, u, 0.0),
+        places=found.places,
+        load=np.nan_to_num(loads),
+        u=np.where(keep, found.u, 0.0),
         keep=keep,
         drift=drift.T,
         axes=axes,
-        place_errors=np.broadcast_to(x_errors, scan.shape).ravel(),
-        load_errors=np.where(np.isfinite(errors), errors, 0.0),
+        place_errors=place_errors,
+        load_errors=np.nan_to_num(of_presses(scan.normal_load_errors, 0.0) / loads),
         board=np.unique(board, return_inverse=True)[1],
-        stated=None if stated is None else stated.reshape(u.shape),
+        stated=None if stated is None else stated.reshape(keep.shape),
         averaging=scan.averaging_length or 0.0,
     )
 
@@ -295,6 +288,7 @@ def _pairs(
 ) -> BoolArray:
     """Return which sensors (rows) read which others, (n, n), of which some are neighbours."""
     n = len(near)
+    pairs = np.zeros((n, n), bool)
     if not isinstance(crosstalk, str):
         asked = np.array(crosstalk, dtype=object)
         if asked.size and asked.shape[1:] != (2,):
@@ -303,7 +297,6 @@ def _pairs(
                 why="Each pair is the reading sensor and the one that it reads of.",
                 cure='Give a list of pairs of names, or "auto", "none", "nearest" or "full".',
             )
-        pairs = np.zeros((n, n), bool)
         for row, column in asked:
             require_names("There is no sensor", [row], scan.sensors)
             others = [name for name in scan.sensors if name != row]
@@ -312,7 +305,7 @@ def _pairs(
         return pairs
     require_names("There is no model of crosstalk", [crosstalk], get_args(CrosstalkModel))
     if crosstalk == "none":
-        return np.zeros((n, n), bool)
+        return pairs
     return ~np.eye(n, dtype=bool) if crosstalk == "full" else near
 
 
@@ -356,20 +349,20 @@ def _begun(
         centres = np.where(used[:, None], centres, layout)
     near = _neighbours(layout)
     pairs = _pairs(scan, near, crosstalk) & used[:, None] & np.isfinite(centres[:, 0])
-    largest = int(np.argmax(np.where(used, found.peak, 0.0)))
     waves = Waves.of(references[0], np.hypot(*np.ptp(presses.places, axis=1)))
-    parameters = Layout.of(presses, pairs, near, largest, 0)
+    scaled = used & (np.arange(used.size) != found.largest)
+    parameters = Layout.of(presses, scaled, pairs, near, 0)
     none = np.zeros((forward.k.size, 0))
     model = JointModel(presses, waves, parameters, none, gaussian, forward)
     n = used.size
     drift = np.zeros((n, presses.drift.shape[1]))
     drift[:, :: 1 + len(presses.axes)] = np.where(used, found.baseline, 0.0)[:, None]
     state = ArrayState(
-        np.where(used, found.peak / found.peak[largest], 1.0),
+        np.where(used, found.peak / found.peak[found.largest], 1.0),
         np.nan_to_num(centres),
         np.eye(n),
         drift,
-        alone.conversion_constant * waves.mix @ model.gaussian_kernels[:, 0],
+        model.start,
         np.zeros((n, 0)),
     )
     deviation = np.where(used, _AT_FIRST * found.peak, 1.0)
@@ -390,21 +383,20 @@ def _guess_dead(centres: FloatArray, axes: tuple[int, ...], used: BoolArray) -> 
         centres[~used, 1 - axes[0]] = 0.0
 
 
-def _own_fit(fit: JointFit, *, shapes: bool) -> JointFit:
-    """Fit a width of its own for each sensor, and with ``shapes`` departures from it, too."""
+def _own_fit(fit: JointFit, shapes: Sequence[Shape]) -> JointFit:
+    """Fit a width of its own for each sensor, and departures of these shapes from it."""
     model = fit.model
     gaussian = model.gaussian
-    kernels = [gaussian.sigma * model.gaussian_kernels[:, 1:]]
-    if shapes:
-        kernels += [
-            shape.rings(gaussian.width, gaussian.conversion_constant).transform(model.forward.k)
-            for shape in _OWN_SHAPES
-        ]
-    own = np.hstack(kernels)
-    largest = int(np.flatnonzero(model.presses.used & (model.layout.gains < 0))[0])
-    pairs = model.layout.crosstalk >= 0
-    layout = Layout.of(model.presses, pairs, model.layout.near, largest, own.shape[1])
-    state = replace(fit.state, own=np.zeros((fit.state.gain.size, own.shape[1])))
+    departures = [
+        shape.rings(gaussian.width, gaussian.conversion_constant).transform(model.forward.k)
+        for shape in shapes
+    ]
+    own = np.hstack([gaussian.sigma * model.gaussian_kernels[:, 1:], *departures])
+    before = model.layout
+    pairs = before.crosstalk >= 0
+    count = own.shape[1]
+    layout = Layout.of(model.presses, before.gains >= 0, pairs, before.near, count)
+    state = replace(fit.state, own=np.zeros((fit.state.gain.size, count)))
     model = replace(model, layout=layout, own_kernels=own)
     rounds = _OWN_ROUNDS if shapes else 1
     return fit_shape(model, state, fit.noise, rounds)
@@ -437,18 +429,16 @@ def _effects(prepared: Prepared, fit: JointFit) -> Arrays:
 def _array(scan: Scan, prepared: Prepared, found: Sorted, fit: JointFit) -> SensorArray:
     """Return the calibrated array, with NaN for sensors that are not used."""
     used = found.used
-    presses = fit.model.presses
     inputs = _effects(prepared, fit)
     columns = np.column_stack([fit.posterior.root, *inputs.values()])
     numbers = array_numbers(fit, columns)
     modes, of_modes = kernel_modes(fit, numbers)
     layout = fit.model.layout
     near = (layout.crosstalk >= 0) & used
-    of_centres = np.zeros((2, used.size, columns.shape[1]))
-    of_centres[list(presses.axes)] = taken(columns, layout.centres)
+    of_centres = taken(columns, layout.centres)
     everything = np.vstack([numbers.of_a, *of_centres, columns[layout.crosstalk[near]], of_modes])
     count = fit.posterior.root.shape[1]
-    effects = {name: everything[:, count + i] for i, name in enumerate(inputs)}
+    effects = dict(zip(inputs, everything.T[count:], strict=True))
     n = used.size
     for name, share in _scalings(prepared).items():
         # What scales all readings alike scales A.
@@ -456,8 +446,7 @@ def _array(scan: Scan, prepared: Prepared, found: Sorted, fit: JointFit) -> Sens
         effects[name][:n] = -share
     state = fit.state
     missing = np.where(used, 0.0, np.nan)
-    centres = np.full((n, 2), np.nan)
-    centres[:, presses.axes] = state.centres[:, presses.axes] + missing[:, None]
+    told = np.isin([0, 1], fit.model.presses.axes)
     k = fit.model.forward.k
     widths = [nearest_width(k, kernel, fit.model.gaussian.sigma) for kernel in numbers.kernels]
     first = prepared.scans[0]
@@ -469,7 +458,7 @@ def _array(scan: Scan, prepared: Prepared, found: Sorted, fit: JointFit) -> Sens
         sensors=tuple(scan.sensors),
         used=used,
         conversion_constants=np.exp(numbers.log_a) + missing,
-        centres=centres,
+        centres=np.where(told, state.centres, np.nan) + missing[:, None],
         crosstalk=np.where(near, state.crosstalk, np.eye(n)),
         estimated=near,
         gaussian_sigmas=np.resize(widths, n) + missing,
@@ -514,7 +503,9 @@ def _readings(fit: JointFit, missing: FloatArray) -> ArrayReadings:
 def _scalings(prepared: Prepared) -> dict[str, float]:
     """Relative standard uncertainties of what scales all readings of the scan alike."""
     scan = prepared.scans[0]
-    shares = {"gain": scan.gain_uncertainty or 0.0}
-    shares["load"] = (scan.load_uncertainty or 0.0) / scan.stated_load
-    shares["reference_convergence"] = prepared.stresses[0].convergence or 0.0
+    shares = {
+        "gain": scan.gain_uncertainty,
+        "load": (scan.load_uncertainty or 0.0) / scan.stated_load,
+        "reference_convergence": prepared.stresses[0].convergence,
+    }
     return {name: share for name, share in shares.items() if share}

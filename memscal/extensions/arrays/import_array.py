@@ -28,13 +28,17 @@ def columns_of_array(
 ) -> dict[str, str]:
     """Return the columns of the sensors, by the names of their readings; ``*`` is any other."""
     heads = table.heads
-    others = [column for name, column in named.items() if column is not None and name != "u_zz"]
-    taken = [table.index_of(column) for column in others]
+    taken = [
+        table.index_of(column)
+        for name, column in named.items()
+        if column is not None and name != "u_zz"
+    ]
     numbers: list[int] = []
     for column in asked:
         pattern = re.escape(str(column)).replace(r"\*", ".+")
-        found = [i for i, head in enumerate(heads) if re.fullmatch(pattern, head)]
-        found = [i for i in found if i not in taken]
+        found = [
+            i for i, head in enumerate(heads) if i not in taken and re.fullmatch(pattern, head)
+        ]
         numbers += found if "*" in str(column) and found else [table.index_of(column)]
     sensors = {_OF + heads[i]: table.names[i] for i in numbers}
     if len(sensors) < len(numbers):

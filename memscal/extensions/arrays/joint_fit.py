@@ -39,8 +39,7 @@ from memscal.model.arrays import TINY, FloatArray, array_record, floats
 SPREADS = (0.0005, 0.001, 0.002, 0.005, 0.01, 0.02, 0.05)
 WIDEST = SPREADS[-1]
 #: Standard deviation of what is a sensor's own: ln width, and departures over the Gaussian's size.
-OWN_WIDTH = 0.05
-_OWN_SHAPE = 0.05
+_OWN = 0.05
 #: Rounds of a fit, and of the first one, after which the noise is known.
 _MOST_ROUNDS = 12
 _FIRST_ROUNDS = 3
@@ -86,14 +85,13 @@ class JointFit:
     def by_widest(self) -> JointFit:
         """The same by the widest prior of the crosstalk."""
         change = self.widest.change - self.posterior.change
-        state = self.model.layout.moved(self.state, change, self.model.presses.axes)
+        state = self.model.layout.moved(self.state, change)
         return replace(self, state=state, posterior=self.widest)
 
     @property
     def residual(self) -> FloatArray:
         """Readings that are not explained, (m, t), in V; zero where not kept."""
-        presses = self.model.presses
-        return np.where(presses.keep, presses.u - self.model.predicted(self.state), 0.0)
+        return self.model.residual(self.state)
 
 
 def prior_precision(layout: Layout, spread: float) -> FloatArray:
@@ -104,18 +102,18 @@ def prior_precision(layout: Layout, spread: float) -> FloatArray:
         # Of t^2 1 + m^2 1 1', by Sherman and Morrison.
         alike = WIDEST**2 / (spread**2 + places.size * WIDEST**2)
         precision[np.ix_(places, places)] = (np.eye(places.size) - alike) / spread**2
-    for i, places in enumerate(layout.own.T):
-        own = places[places >= 0]
-        precision[own, own] = (_OWN_SHAPE if i else OWN_WIDTH) ** -2
+    own = layout.own[layout.own >= 0]
+    precision[own, own] = _OWN**-2
     return precision
 
 
 def parameters_of(layout: Layout, state: ArrayState) -> FloatArray:
     """Return the parameters that have a prior, (p,); zero of all others."""
-    values = np.zeros(layout.count)
-    for places, numbers in ((layout.crosstalk, state.crosstalk), (layout.own, state.own)):
-        values[places[places >= 0]] = numbers[places >= 0]
-    return values
+    # The last one is that of all places of -1.
+    values = np.zeros(layout.count + 1)
+    values[layout.crosstalk] = state.crosstalk
+    values[layout.own] = state.own
+    return values[:-1]
 
 
 def inverse_root(matrix: FloatArray) -> FloatArray:
@@ -136,9 +134,11 @@ def inverse_root(matrix: FloatArray) -> FloatArray:
 def noise_of(model: JointModel, state: ArrayState) -> Noise:
     """Estimate each sensor's own noise, and what is common to a board, from what is left."""
     presses = model.presses
-    residual = np.where(presses.keep, presses.u - model.predicted(state), 0.0)
+    residual = model.residual(state)
     errors = model.press_errors(state)
-    count = np.maximum(presses.keep.sum(axis=1), 1)
+    both = np.maximum(presses.keep.astype(float) @ presses.keep.T, 1)
+    count = np.diag(both)
+    of_presses = np.sum(errors @ errors.mT, axis=0) / both
     freedom = np.maximum(1 - model.layout.count / presses.used.sum() / count, 0.1)
     smallest = (_ROUNDING * np.ptp(presses.u, axis=1)) ** 2
     # Presses whose stated errors are small to a sensor, as it is far from them, tell its noise.
@@ -154,17 +154,15 @@ def noise_of(model: JointModel, state: ArrayState) -> Noise:
     for i in np.unique(presses.board):
         members = np.flatnonzero(presses.used & (presses.board == i))
         if members.size > 1:
-            block = square[np.ix_(members, members)]
-            shared = np.mean(block[np.triu_indices(members.size, 1)])
-            common[np.ix_(members, members)] = max(shared, 0.0)
+            block = np.ix_(members, members)
+            shared = np.mean(square[block][np.triu_indices(members.size, 1)])
+            common[block] = max(shared, 0.0)
     total = np.diag(square)
     if presses.stated is not None:
         stated = np.sum(presses.stated**2, axis=1, where=presses.keep) / count
         total = np.maximum(total, stated)
     least = np.maximum(_LEAST_OWN * total, smallest)
     least[~presses.used] = 1.0
-    both = np.maximum(presses.keep.astype(float) @ presses.keep.T, 1)
-    of_presses = np.sum(errors @ errors.mT, axis=0) / both
     return Noise(np.maximum(total - np.diag(common), least), common, of_presses)
 
 
@@ -192,23 +190,18 @@ def fit_shape(
     model: JointModel, state: ArrayState, noise: Noise, rounds: int = _MOST_ROUNDS
 ) -> JointFit:
     """Fit an array by damped Gauss-Newton steps, each with the shapes of G weighed anew."""
-    presses = model.presses
-    everything = np.eye(len(model.waves.mix))
     spreads = SPREADS if model.layout.crosstalk.max() >= 0 else [WIDEST]
-    gaussian = model.gaussian
-    kernel = gaussian.conversion_constant * model.waves.mix @ model.gaussian_kernels[:, 0]
     for _ in range(rounds):
-        about = replace(state, kernel=kernel)
-        data = presses.u - model.predicted(about)
-        information = model.information(state, noise, everything, data)
+        data = model.residual(replace(state, kernel=model.start))
+        information = model.information(state, noise, data)
         weighed = [weighed_by(model, information, state, spread) for spread in spreads]
         likeliest = max(weighed, key=attrgetter("log_evidence"))
         best = likeliest.posterior()
-        longest = abs(taken(best.change, model.layout.centres)).max() / gaussian.width
+        longest = abs(taken(best.change, model.layout.centres)).max() / model.gaussian.width
         share = _LONGEST / max(longest, _LONGEST)
-        moved = model.layout.moved(state, share * best.change, presses.axes)
+        moved = model.layout.moved(state, share * best.change)
         state = replace(moved, kernel=model.waves.mix @ best.kernel)
-        size = np.sqrt(np.sum(best.root[: model.layout.count] ** 2, axis=1))
+        size = np.linalg.norm(best.root[: model.layout.count], axis=1)
         if np.all(abs(best.change) < _SETTLED * size):
             break
     widest = weighed[-1].posterior()
@@ -233,17 +226,14 @@ class Weighed:
         kernels = basis.kernels(self.weighing.reduced.model.k)
         # The parameters given a kernel: what they are without it, less what it explains of them.
         by_kernel = self.by_others[:, 1:] @ (self.mix @ kernels)
-        of_kernel = square_root(weighed.covariance)
-        count = len(by_kernel)
-        none = np.zeros((len(kernels), count))
-        root = np.block([[self.root, -by_kernel @ of_kernel], [none, kernels @ of_kernel]])
+        both = np.vstack([-by_kernel, kernels])
+        below = ((0, len(kernels)), (0, 0))
         kernel_gain = weighed.gain.dense() @ self.columns[:, 1:]
-        own_gain = self.by_others[:, 1:] - by_kernel @ kernel_gain
         return Posterior(
             change=self.by_others[:, 0] - by_kernel @ weighed.mean,
             kernel=basis.conversion_constant * kernels[:, 0] + kernels @ weighed.mean,
-            root=root,
-            gain=np.vstack([own_gain, kernels @ kernel_gain]),
+            root=np.hstack([np.pad(self.root, below), both @ square_root(weighed.covariance)]),
+            gain=np.pad(self.by_others[:, 1:], below) + both @ kernel_gain,
         )
 
 
@@ -264,24 +254,22 @@ def weighed_by(
     by_others = root @ (root.T @ gram[own][:, others])
     left = gram[np.ix_(others, others)] - gram[own][:, others].T @ by_others
     columns = square_root(left).T
-    reduced = _reduced(columns, model)
+    synthesis = columns[:, 1:] @ model.waves.mix
+    # Data and kernels that are left, in the place of a reduced scan about a Gaussian.
+    reduced = ReducedScan(
+        model.forward,
+        model.gaussian,
+        data=columns[:, 0],
+        flat=synthesis @ model.gaussian_kernels,
+        components=columns[:, :0],
+        weights=np.ones(len(columns)),
+        synthesis=synthesis,
+        right=np.eye(len(columns)),
+    )
     basis = departure_basis(model.gaussian, reduced)
     count = model.presses.keep.sum() - model.layout.count
     weighing = bayesian.weigh_departures(reduced, basis, count, least_noise=1.0)
-    stated = np.diag(precision) > 0
-    volume = (
-        np.linalg.slogdet(precision[np.ix_(stated, stated)])[1] / 2 + np.log(np.diag(root)).sum()
-    )
-    evidence = float(weighing.evidence + volume)
+    flat = np.diag(precision) == 0
+    of_prior = np.linalg.slogdet(precision + np.diag(flat))[1] / 2
+    evidence = float(weighing.evidence + of_prior + np.log(np.diag(root)).sum())
     return Weighed(evidence, root, by_others, columns, model.waves.mix, weighing)
-
-
-def _reduced(columns: FloatArray, model: JointModel) -> ReducedScan:
-    """Return data and kernels in the place of a reduced scan, about a Gaussian."""
-    synthesis = columns[:, 1:] @ model.waves.mix
-    flat = synthesis @ model.gaussian_kernels
-    none = np.zeros((len(columns), 0))
-    weights = np.ones(len(columns))
-    around = (model.forward, model.gaussian)
-    same = np.eye(len(columns))
-    return ReducedScan(*around, columns[:, 0], flat, none, weights, synthesis, same)

@@ -60,30 +60,27 @@ class Layout:
     Those of sensors that are not used are -1.
     """
 
+    count: int
     gains: IndexArray  # (m,): -1 of the largest, too
-    centres: IndexArray  # (axes, m)
+    centres: IndexArray  # (2, m): -1 across a line, too
     crosstalk: IndexArray  # (m, m): -1 where not estimated
     drift: IndexArray  # (m, d)
     own: IndexArray  # (m, o)
     near: BoolArray  # (m, m): neighbours, whose crosstalk has a mean of its own
-    count: int
 
     @classmethod
     def of(
-        cls, presses: Presses, pairs: BoolArray, near: BoolArray, largest: int, own: int
+        cls, presses: Presses, scaled: BoolArray, pairs: BoolArray, near: BoolArray, own: int
     ) -> Layout:
-        """Count the parameters of an array with crosstalk of pairs (m, m)."""
+        """Count the parameters of an array with gains (m,) and crosstalk (m, m) of some."""
         used = presses.used
-        m = used.size
-        some = np.arange(m) != largest
-        # A sensor may have no readings in a pass.
-        passed = presses.keep.astype(float) @ (presses.drift != 0) > 0
         free = [
-            used & some,
-            np.broadcast_to(used, (len(presses.axes), m)),
+            scaled,
+            used & np.isin([[0], [1]], presses.axes),
             pairs,
-            passed,
-            np.broadcast_to(used[:, None], (m, own)),
+            # A sensor may have no readings in a pass.
+            presses.keep.astype(float) @ (presses.drift != 0) > 0,
+            np.tile(used[:, None], own),
         ]
         places = []
         count = 0
@@ -92,17 +89,14 @@ class Layout:
             numbers[mask] = np.arange(count, count + mask.sum())
             count += int(mask.sum())
             places.append(numbers)
-        gains, centres, crosstalk, drift, changes = places
-        return cls(gains, centres, crosstalk, drift, changes, near, count)
+        return cls(count, *places, near=near)
 
-    def moved(self, state: ArrayState, change: FloatArray, axes: tuple[int, ...]) -> ArrayState:
+    def moved(self, state: ArrayState, change: FloatArray) -> ArrayState:
         """Return a state changed by the parameters (p,)."""
-        centres = state.centres.copy()
-        centres[:, axes] += taken(change, self.centres).T
         return replace(
             state,
             gain=state.gain * np.exp(taken(change, self.gains)),
-            centres=centres,
+            centres=state.centres + taken(change, self.centres).T,
             crosstalk=state.crosstalk + taken(change, self.crosstalk),
             drift=state.drift + taken(change, self.drift),
             own=state.own + taken(change, self.own),
@@ -131,6 +125,12 @@ class JointModel:
         return departure_basis(self.gaussian).kernels(self.forward.k)[:, :2]
 
     @property
+    def start(self) -> FloatArray:
+        """The Gaussian by its combination of the waves, (f,), in V/Pa."""
+        kernel = self.waves.mix @ self.gaussian_kernels[:, 0]
+        return np.asarray(self.gaussian.conversion_constant * kernel)
+
+    @property
     def own(self) -> FloatArray:
         """These changes by their combinations of the waves, (f, o)."""
         return self.waves.mix @ self.own_kernels
@@ -144,17 +144,14 @@ class JointModel:
     def signals(self, state: ArrayState) -> tuple[FloatArray, FloatArray]:
         """What each sensor would read without crosstalk, (m, t), and its slope by the distance."""
         radius, _ = self.distances(state)
-        own = self.own @ state.own.T
-        kernels = state.kernel[:, None] + own
+        kernels = state.kernel + state.own @ self.own.T
         signals = np.empty(radius.shape)
         slopes = np.empty(radius.shape)
-        common = not state.own.any()
-        profiles = self.waves.profiles(kernels[:, :1] if common else kernels)
         for j, distance in enumerate(radius):
-            column = 0 if common else j
+            profile = self.waves.profiles(kernels[j])
             factor = state.gain[j] * self.presses.load
-            signals[j] = factor * profiles(distance)[:, column]
-            slopes[j] = factor * profiles(distance, 1)[:, column]
+            signals[j] = factor * profile(distance)
+            slopes[j] = factor * profile(distance, 1)
         return signals, slopes
 
     def predicted(self, state: ArrayState) -> FloatArray:
@@ -162,58 +159,48 @@ class JointModel:
         signals, _ = self.signals(state)
         return state.crosstalk @ signals + state.drift @ self.presses.drift.T
 
-    def information(
-        self, state: ArrayState, noise: Noise, kernels: FloatArray, data: FloatArray
-    ) -> FloatArray:
-        """Linearise about a state, with kernels (f, q) of all sensors, for residuals (m, t).
+    def residual(self, state: ArrayState) -> FloatArray:
+        """Readings that are not explained, (m, t), in V; zero where not kept."""
+        presses = self.presses
+        return np.where(presses.keep, presses.u - self.predicted(state), 0.0)
 
-        Weighted sums of products of the residuals, of p parameters and of the kernels: one matrix.
+    def information(self, state: ArrayState, noise: Noise, data: FloatArray) -> FloatArray:
+        """Linearise about a state, with any kernel (f,) of all sensors, for residuals (m, t).
+
+        Weighted sums of products of the residuals, of p parameters and of the kernel: one matrix.
         """
         presses = self.presses
         layout = self.layout
         p = layout.count
-        q = kernels.shape[1]
+        q = len(self.waves.mix)
         radius, towards = self.distances(state)
         signals, slopes = self.signals(state)
-        moved = [slopes * towards[axis] for axis in presses.axes]
-        profiles = self.waves.profiles(np.hstack([kernels, self.own]))
-        factors = state.gain[:, None] * presses.load
-        by_kernel = [f[:, None] * profiles(r) for f, r in zip(factors, radius, strict=True)]
+        by_kernel = self.waves.profiles(np.hstack([np.eye(q), self.own]))(radius)
+        by_kernel *= (state.gain[:, None] * presses.load)[:, :, None]
+        # By what is each sensor's own, whichever sensors read it.
+        sources = np.vstack(
+            [signals[None], slopes * towards, np.moveaxis(by_kernel[..., q:], 2, 0)]
+        )
+        numbers = np.vstack([layout.gains, layout.centres, layout.own.T])
         common = self._common(noise, self.press_errors(state))
         gram = np.zeros((1 + p + q, 1 + p + q))
         shared = np.zeros((len(common), presses.load.size, 1 + p + q))
-        kernel_places = np.arange(1 + p, 1 + p + q)
         for i in np.flatnonzero(presses.used):
             row = state.crosstalk[i]
             near = np.flatnonzero((row != 0) | (layout.crosstalk[i] >= 0))
-            drifts = layout.drift[i] >= 0
-            names = [np.zeros(1, np.intp), 1 + layout.drift[i, drifts]]
-            columns = [data[i][:, None], presses.drift[:, drifts]]
-            of_all = np.zeros((presses.load.size, q))
-            for j in near:
-                whole = by_kernel[j]
-                of_all += row[j] * whole[:, :q]
-                parts = [signals[j] * row[j], *(row[j] * change[j] for change in moved)]
-                places = [layout.gains[j], *layout.centres[:, j]]
-                if i != j:
-                    parts.append(signals[j])
-                    places.append(layout.crosstalk[i, j])
-                parts += list(row[j] * whole[:, q:].T)
-                places += list(layout.own[j])
-                known = np.array(places) >= 0
-                columns.append(np.stack(parts, axis=1)[:, known])
-                names.append(1 + np.array(places)[known])
-            columns.append(of_all)
-            names.append(kernel_places)
+            read = row[near, None] * sources[:, near]
+            changes = np.vstack([presses.drift.T, signals[near], *read])
+            of_all = np.tensordot(row[near], by_kernel[near, :, :q], 1)
+            places = [layout.drift[i], layout.crosstalk[i, near], numbers[:, near].ravel()]
+            parameters = np.concatenate(places)
+            known = parameters >= 0
             root = presses.keep[i] / np.sqrt(noise.own[i])
-            block = root[:, None] * np.hstack(columns)
-            index = np.concatenate(names)
+            block = root[:, None] * np.column_stack([data[i], changes[known].T, of_all])
+            index = np.concatenate([[0], 1 + parameters[known], np.arange(1 + p, 1 + p + q)])
             gram[np.ix_(index, index)] += block.T @ block
             for level, change in zip(shared, common, strict=True):
                 level[:, index] += (root * change[i])[:, None] * block
-        if len(common):
-            gram -= self._in_common(common, noise, shared)
-        return gram
+        return gram - self._in_common(common, noise, shared)
 
     def by_press(self, state: ArrayState) -> FloatArray:
         """Derivatives of kept readings by the place along the scan and by ln load, (2, m, t)."""
@@ -230,12 +217,10 @@ class JointModel:
         """What one deviation of each thing in common to a press does, (c, m, t), in V."""
         board = self.presses.board
         deviation = np.sqrt(np.diag(noise.common))
-        boards = [
-            np.broadcast_to((deviation * (board == i))[:, None], errors.shape[1:])
-            for i in np.unique(board)
-        ]
-        stated = [change for change in [*boards, *errors] if change.any()]
-        return np.reshape(stated, (len(stated), *errors.shape[1:]))
+        boards = deviation * np.equal.outer(np.unique(board), board)
+        at_each = np.repeat(boards[:, :, None], errors.shape[2], axis=2)
+        changes = np.concatenate([at_each, errors])
+        return changes[changes.any(axis=(1, 2))]
 
     def _in_common(self, common: FloatArray, noise: Noise, shared: FloatArray) -> FloatArray:
         """What readings of a press that share their errors tell less, by Woodbury's identity."""

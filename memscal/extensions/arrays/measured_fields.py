@@ -14,12 +14,10 @@ from typing import Any
 import numpy as np
 
 from memscal.extensions.arrays.array_data import ArrayData
-from memscal.model.arrays import ArrayPair, ArrayTriple, FloatArray, array_record, floats
+from memscal.model.arrays import ArrayPair, FloatArray, array_record, floats
 
 #: The length over which fields change, in steps of the raster.
 _SCALE = 4.0
-#: Derivatives: of the field, by x, by y.
-_ORDERS = ((0, 0), (1, 0), (0, 1))
 
 
 @array_record
@@ -44,7 +42,7 @@ class MeasuredFields:
     @property
     def centres(self) -> FloatArray:
         """Ends of the raster, (2, 2), in m: the sensors' own places do not matter."""
-        return floats([[axis[i] for axis in self.nodes] for i in (0, -1)])
+        return np.transpose([axis[[0, -1]] for axis in self.nodes])
 
     @property
     def scale(self) -> float:
@@ -65,20 +63,19 @@ class MeasuredFields:
 
     def value(self, places: FloatArray, *_: Any) -> FloatArray:
         """Fields per press, (m, n)."""
-        x, y = places.T
-        return np.stack([one.ev(x, y) for one in self._splines], axis=1)
+        return self._derived(places, 0, 0)
 
-    def normal(self, places: FloatArray, *_: Any) -> ArrayTriple:
-        """The same, and their derivatives by x and y, (m, n) each."""
+    def normal(self, places: FloatArray, *_: Any) -> FloatArray:
+        """Their derivatives by x and y, and they themselves, (3, m, n)."""
+        return np.stack([self._derived(places, *order) for order in ((1, 0), (0, 1), (0, 0))])
+
+    def _derived(self, places: FloatArray, by_x: int, by_y: int) -> FloatArray:
         x, y = places.T
-        h, by_x, by_y = (
-            np.stack([one.ev(x, y, *order) for one in self._splines], axis=1) for order in _ORDERS
-        )
-        return h, by_x, by_y
+        return np.stack([one.ev(x, y, by_x, by_y) for one in self._splines], axis=1)
 
     def forward(self, places: FloatArray, force: FloatArray, *_: Any) -> ArrayPair:
         """Readings (m, n), and their derivatives by x, y, presses and two shears, (m, n, 5)."""
-        h, by_x, by_y = self.normal(places)
+        by_x, by_y, h = self.normal(places)
         scale = force[:, None]
         return scale * h, np.stack([scale * by_x, scale * by_y, h, 0 * h, 0 * h], axis=-1)
 

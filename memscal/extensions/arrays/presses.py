@@ -75,8 +75,10 @@ _CLIPPED = ((3, 0.02), (6, 0.2))
 
 @array_record
 class Sorted:
-    """Which readings (n, t) of an array count, and which of its n sensors."""
+    """Readings (n, t) of an array at places (2, t), and which count; which of its n sensors do."""
 
+    places: FloatArray
+    u: FloatArray
     keep: BoolArray
     used: BoolArray
     dead: BoolArray
@@ -84,17 +86,21 @@ class Sorted:
     peak: FloatArray  # (n,): over the baseline, in V
     baseline: FloatArray  # (n,)
 
+    @property
+    def largest(self) -> int:
+        """The used sensor of the highest peak."""
+        return int(np.argmax(np.where(self.used, self.peak, -np.inf)))
 
-def sorted_readings(scan: Scan, places: FloatArray, u: FloatArray) -> Sorted:
-    """Find dead sensors and readings at a ceiling, as stated or as they agree, of u (n, t)."""
-    n = len(u)
-    keep = np.isfinite(u)
+
+def sorted_readings(scan: Scan) -> Sorted:
+    """Find dead sensors and readings at a ceiling, as stated or as they agree."""
+    n = len(scan.sensors)
+    places = np.stack([values.ravel() for values in scan.positions])
+    u = scan.u_zz.reshape(n, -1)
     numbers = np.zeros((3, n))
-    at_ceiling = np.zeros(n, np.intp)
-    low = -np.inf if scan.reading_low is None else scan.reading_low
-    high = np.inf if scan.reading_high is None else scan.reading_high
-    keep &= (u > np.reshape(low, (-1, 1))) & (u < np.reshape(high, (-1, 1)))
-    at_ceiling += np.isfinite(u).sum(axis=1) - keep.sum(axis=1)
+    low = -np.inf if scan.reading_low is None else scan.reading_low[:, None]
+    high = np.inf if scan.reading_high is None else scan.reading_high[:, None]
+    keep = (u > low) & (u < high)
     for i, row in enumerate(u):
         inside = np.flatnonzero(keep[i])
         if inside.size < _FEWEST:
@@ -113,16 +119,15 @@ def sorted_readings(scan: Scan, places: FloatArray, u: FloatArray) -> Sorted:
         # Steps tell the noise also where a peak begins.
         noise = np.sqrt(np.mean(np.diff(level[outermost]) ** 2) / 2)
         numbers[:, i] = peak, np.median(values[outermost]), noise
-        clipped = inside[_clipped(values, numbers[2, i])]
-        if scan.reading_high is None and clipped.size:
-            keep[i, clipped] = False
-            at_ceiling[i] += clipped.size
+        if scan.reading_high is None:
+            keep[i, inside[_clipped(values, noise)]] = False
     peak, baseline, noise = numbers
     stated = np.ones(n, bool) if scan.used is None else scan.used
     # The few outermost readings of one sensor may scatter by less than its noise.
     dead = stated & (peak <= _DEAD * np.maximum(noise, np.median(noise)))
     used = stated & ~dead
-    return Sorted(keep & used[:, None], used, dead, at_ceiling * used, peak, baseline)
+    at_ceiling = np.sum(np.isfinite(u) & ~keep, axis=1) * used
+    return Sorted(places, u, keep & used[:, None], used, dead, at_ceiling, peak, baseline)
 
 
 def _clipped(u: FloatArray, noise: float) -> IndexArray:

@@ -29,7 +29,6 @@ from memscal.mechanics.film_response import base_response
 from memscal.mechanics.indent import indent
 from memscal.model.arrays import (
     ArrayPair,
-    ArrayTriple,
     FloatArray,
     IndexArray,
     array_record,
@@ -93,12 +92,11 @@ class ReceptiveFields:
         [value] = self._looked_up(self._offsets(places), force, columns=1)
         return floats(value @ self.mixing.T)
 
-    def normal(self, places: FloatArray, force: FloatArray | float = 1.0) -> ArrayTriple:
-        """The same, and their derivatives by x and y, (m, n) each."""
+    def normal(self, places: FloatArray, force: FloatArray | float = 1.0) -> FloatArray:
+        """Their derivatives by x and y, and they themselves, (3, m, n)."""
         offsets = self._offsets(places)
         value, slope = self._looked_up(offsets, force, columns=2)
-        along_x, along_y = offsets * slope
-        return value @ self.mixing.T, along_x @ self.mixing.T, along_y @ self.mixing.T
+        return floats(np.stack([*(offsets * slope), value]) @ self.mixing.T)
 
     def forward(self, places: FloatArray, force: FloatArray, shear: FloatArray) -> ArrayPair:
         """Readings (m, n), and their derivatives by x, y, force and the two shears, (m, n, 5)."""
@@ -110,11 +108,11 @@ class ReceptiveFields:
     def errors(self, places: FloatArray, force: FloatArray, shear: FloatArray) -> FloatArray:
         """Changes of the readings by one u of each independent error of the array, (m, n, c)."""
         array = self.array
-        x_slope, y_slope, value, _, _ = np.moveaxis(self._sources(places, force, shear), -1, 0)
-        *rows, by_pair, _ = array.split(array.columns)
-        by_strength, by_x, by_y = (part[self.sensors] for part in rows)
-        own = value[..., None] * by_strength
-        own -= x_slope[..., None] * by_x + y_slope[..., None] * by_y
+        sources = self._sources(places, force, shear)[..., :3]
+        by_strength, by_x, by_y, by_pair, _ = array.split(array.columns)
+        # A sensor that is elsewhere is one whose contact is on the other side.
+        moves = np.stack([-by_x, -by_y, by_strength])[:, self.sensors]
+        own = np.einsum("mnf,fnc->mnc", sources, moves)
         apart = np.linalg.norm(places[:, None] - self.centres, axis=-1)
         for change, owner, size in zip(self.changes, self.owner, self.sizes, strict=True):
             has = (owner == ALL) | (self.sensors == owner)
@@ -122,7 +120,7 @@ class ReceptiveFields:
         moved = self.mixing @ own
         known = array.used[array.pairs].all(axis=1)
         rows_of, others = (np.cumsum(array.used) - 1)[array.pairs[known]].T
-        read = value * array.conversion_constants[self.sensors]
+        read = sources[..., 2] * array.conversion_constants[self.sensors]
         for row, other, size in zip(rows_of, others, by_pair[known], strict=True):
             moved[:, row] += read[:, other, None] * size
         return floats(force[:, None, None] * moved)
@@ -140,8 +138,7 @@ class ReceptiveFields:
 
     def _offsets(self, places: FloatArray) -> FloatArray:
         """Return places from the centre of each sensor, (2, m, n)."""
-        axes = zip(places.T, self.centres.T, strict=True)
-        return np.stack([np.subtract.outer(place, centre) for place, centre in axes])
+        return np.subtract(places.T[..., None], self.centres.T[:, None], order="C")
 
     def _looked_up(
         self, offsets: FloatArray, force: FloatArray | float, *, columns: int

@@ -313,8 +313,8 @@ class Stream:
 
     def _slopes(self, place: FloatArray, force: FloatArray | float) -> FloatArray:
         """Return changes of readings by force times x (and y), and by force, (m, c, n)."""
-        value, by_x, by_y = self._seeking.fields.normal(place, force)
-        return np.stack([by_x, by_y, value], axis=1)[:, self._told]
+        slopes = self._seeking.fields.normal(place, force)[self._told]
+        return floats(slopes.swapaxes(0, 1))
 
     def _fit(self, deviations: FloatArray, weight: FloatArray, threshold: float) -> _Fit:
         """Find one contact in each of some deviations from the baselines."""

@@ -179,7 +179,7 @@ def test_dead_sensors_that_drift_are_dead(seed):
     silent = scan.u_zz.max() * (drift + rng.normal(0.0, 0.005, (dead, scan.x.size)))
     u = np.vstack([*[scan.u_zz] * 7, silent])
     many = memscal.Scan(x=scan.x, u_zz=u, sensors=[f"T{i}" for i in range(len(u))])
-    found = sorted_readings(many, np.stack(scan.of_sensor(0).positions), u)
+    found = sorted_readings(many)
     np.testing.assert_array_equal(found.dead, np.arange(len(u)) >= 70)
 
 
