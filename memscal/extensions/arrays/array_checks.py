@@ -211,21 +211,23 @@ def _models_agree(fit: JointFit, compared: JointFit) -> Failing:
 def _common_kernel(own: JointFit) -> Failing:
     """Test whether widths differ, where the common shape is free."""
     used = np.flatnonzero(own.model.presses.used)
-    places = own.model.layout.own[used, 0]
+    places = own.model.layout.own[used]
     gram = own.information
     scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
     scaled = gram / np.outer(scale, scale)
-    widths = 1 + places
+    # The readings were linearised before the last step, about shapes of the sensors' own.
+    before = own.state.own[used] - own.posterior.change[places]
+    moved = scaled[:, 1 + places.ravel()] @ (before * scale[1 + places]).ravel()
+    data = scaled[:, 0] * scale[0] + moved
+    widths = 1 + places[:, 0]
     rest = np.delete(np.arange(1, len(gram)), places)
     inverse = np.linalg.pinv(scaled[np.ix_(rest, rest)], rcond=1e-10, hermitian=True)
-    left = scaled - scaled[:, rest] @ inverse @ scaled[rest]
-    information = left[np.ix_(widths, widths)]
-    # The readings were linearised before the last step.
-    before = own.state.own[used, 0] - own.posterior.change[places]
-    data = left[widths, 0] * scale[0] + information @ (before * scale[widths])
+    explained = scaled[np.ix_(widths, rest)] @ inverse
+    information = scaled[np.ix_(widths, widths)] - explained @ scaled[np.ix_(rest, widths)]
+    data = data[widths] - explained @ data[rest]
     # A common width is one of the common shape.
     square = data @ np.linalg.pinv(information, rcond=1e-8, hermitian=True) @ data
-    z = abs(own.state.own[used, 0]) / np.linalg.norm(own.posterior.root[places], axis=1)
+    z = abs(own.state.own[used, 0]) / np.linalg.norm(own.posterior.root[places[:, 0]], axis=1)
     return (
         added_check(
             "common_kernel",

@@ -61,12 +61,12 @@ class Layout:
     """
 
     count: int
+    near: BoolArray  # (m, m): neighbours, whose crosstalk has a mean of its own
     gains: IndexArray  # (m,): -1 of the largest, too
     centres: IndexArray  # (2, m): -1 across a line, too
     crosstalk: IndexArray  # (m, m): -1 where not estimated
     drift: IndexArray  # (m, d)
     own: IndexArray  # (m, o)
-    near: BoolArray  # (m, m): neighbours, whose crosstalk has a mean of its own
 
     @classmethod
     def of(
@@ -89,7 +89,7 @@ class Layout:
             numbers[mask] = np.arange(count, count + mask.sum())
             count += int(mask.sum())
             places.append(numbers)
-        return cls(count, *places, near=near)
+        return cls(count, near, *places)
 
     def moved(self, state: ArrayState, change: FloatArray) -> ArrayState:
         """Return a state changed by the parameters (p,)."""
