@@ -24,9 +24,9 @@ MEAN = 0.001 + (0.0 if FULL else 4 * 0.0025 / SCANS**0.5)
 class Calibrated:
     """One scan's calibration beside the truth."""
 
-    def __init__(self, seed, kernel, kernel_of, **made):
+    def __init__(self, seed, kernel, kernel_of, pairs, **made):
         self.scan, self.truth = simulated_scan(seed=seed, kernel=kernel_of, **made)
-        self.calibration = memscal.calibrate_array(self.scan, kernel=kernel)
+        self.calibration = memscal.calibrate_array(self.scan, kernel=kernel, crosstalk=pairs)
         self.array = self.calibration.array
         n = len(self.array.sensors)
         self.used = self.array.used
@@ -72,8 +72,8 @@ class Calibrated:
 
 
 @lru_cache(maxsize=200)
-def calibrated(seed, kernel="common", kernel_of="gaussian", **made):
-    return Calibrated(seed, kernel, kernel_of, **made)
+def calibrated(seed, kernel="common", kernel_of="gaussian", pairs="auto", **made):
+    return Calibrated(seed, kernel, kernel_of, pairs, **made)
 
 
 def of(made, what, scans=SCANS):
@@ -100,6 +100,10 @@ def test_crosstalk_and_constants_are_as_sure_as_they_say(kernel):
     found = [calibrated(seed, **made).of_crosstalk for seed in range(SCANS)]
     assert abs(np.mean([error for error, _ in found])) < MEAN
     assert np.median([u for _, u in found]) < 0.0035
+
+
+def test_all_pairs_are_as_sure_as_they_say():
+    assert_as_stated({"pairs": "full"}, "of_crosstalk", "of_constants", "of_ratios")
 
 
 @pytest.mark.parametrize("kernel", KERNELS)

@@ -95,6 +95,79 @@ def test_pairs_are_chosen(crosstalk, count):
     assert np.count_nonzero(array.crosstalk) == 4 + count
 
 
+def test_pairs_that_read_nothing_of_each_other_do_not_hide_the_crosstalk_of_neighbours():
+    names = [f"T0{i}" for i in range(5)]
+    apart = abs(np.subtract.outer(range(5), range(5)))
+    near = [(names[i], names[j]) for i, j in np.argwhere((apart > 0) & (apart < 3))]
+    for seed, crosstalk in enumerate(["full", near]):
+        scan, true = simulated_scan(1, 5, seed=seed, crosstalk=0.02)
+        array = memscal.calibrate_array(scan, crosstalk=crosstalk).array
+        of_a, of_c = deviations(array, true)
+        assert np.sqrt(np.mean(of_a**2)) < 3.5
+        assert np.sqrt(np.mean(of_c**2)) < 3.5
+        assert np.all(array.crosstalk[apart == 1] > 0.01)
+
+
+def test_stated_errors_of_presses_may_be_larger_than_the_noise():
+    for seed in range(4):
+        errors = Errors(noise=0.002, load=0.01)
+        scan, true = simulated_scan(1, 6, seed=seed, errors=errors)
+        array = memscal.calibrate_array(replace(scan, u_zz_errors=None)).array
+        of_a, _ = deviations(array, true)
+        assert np.sqrt(np.mean(of_a**2)) < 3.5
+        noise = np.sqrt(np.diag(array.noise)) / np.max(scan.u_zz)
+        assert np.all(abs(noise / 0.002 - 1) < 0.5)
+
+
+@pytest.mark.parametrize("silent", [[1], [0, 1, 2, 3]], ids=["one", "all"])
+def test_a_pass_without_readings_changes_nothing_else(silent):
+    scan = simulated_scan(1, 4, repeats=3, seed=7)[0]
+    u = scan.u_zz.copy()
+    u[silent, 1] = np.nan
+    plain, lacking = (
+        memscal.calibrate_array(replace(scan, u_zz=readings)).array for readings in (scan.u_zz, u)
+    )
+    moved = np.log(lacking.conversion_constants / plain.conversion_constants)
+    assert np.all(abs(moved) < lacking.uncertainties()[:4])
+
+
+@pytest.mark.parametrize("count", [2, 4, 7])
+def test_a_sensor_near_the_end_of_the_scan_is_not_dead(count):
+    scan, _ = simulated_scan(1, count, beyond=1.0, seed=count, errors=Errors(noise=0.002))
+    array = memscal.calibrate_array(scan).array
+    assert array.used.all()
+    assert len(array.failing["ends_covered"]) == 2
+
+
+def test_a_dead_sensor_of_an_even_row_is_where_it_should_be():
+    scan = simulated_scan(1, 8, seed=5, errors=Errors(dead=(3,)))[0]
+    unplaced = replace(scan, layout=None, layout_uncertainty=None)
+    a, of_unplaced = (
+        memscal.calibrate_array(each).array.conversion_constants for each in (scan, unplaced)
+    )
+    # Without the place of the dead one A is 3 % too large.
+    np.testing.assert_allclose(of_unplaced, a, rtol=2e-3)
+
+
+def test_what_is_stated_of_the_base_is_counted_and_what_is_not_is_named():
+    scan = simulated_scan(1, 4, seed=2)[0]
+    plain = memscal.calibrate_array(scan).array
+    stated = replace(
+        scan,
+        base_slip_uncertainty=0.3,
+        shear_sensitivity_uncertainty=0.1e-3,
+        roundness_uncertainty=0.2,
+    )
+    array = memscal.calibrate_array(stated).array
+    for name in ("base_slip", "shear_sensitivity"):
+        # As of one sensor alone, by another method.
+        assert np.all(abs(array.effects[name][:4]) > 0.01)
+    assert np.all(array.uncertainties()[:4] > 2 * plain.uncertainties()[:4])
+    said = " ".join(message.text for message in array.messages)
+    assert "roundness_uncertainty" in said
+    assert "base_slip" not in said
+
+
 @pytest.mark.parametrize("shape", [(1, 4), (3, 3)], ids=["row", "grid"])
 def test_a_layout_is_where_the_sensors_are_or_fails(shape):
     scan = simulated_scan(*shape, seed=4)[0]
@@ -114,6 +187,29 @@ def test_a_layout_is_where_the_sensors_are_or_fails(shape):
         calibration = memscal.calibrate_array(wrong)
         assert calibration.passed == passes
         assert ("T00" in calibration.array.failing["layout"]) != passes
+
+
+def test_a_layout_with_sensors_beside_the_line_fails():
+    scan = simulated_scan(1, 6, seed=4)[0]
+    for beside, passes in ((10e-6, True), (0.3e-3, False)):
+        zigzag = scan.layout + np.outer((-1.0) ** np.arange(6), [0.0, beside])
+        array = memscal.calibrate_array(replace(scan, layout=zigzag)).array
+        assert (array.failing["layout"] == ()) == passes
+
+
+def test_widths_are_compared_about_a_common_shape_whatever_else_is():
+    scan = simulated_scan(3, 3, seed=2)[0]
+    common, auto = (
+        next(
+            check.value
+            for check in memscal.calibrate_array(scan, kernel=kernel).checks
+            if check.name == "common_kernel"
+        )
+        for kernel in ("common", "auto")
+    )
+    # Eight degrees of freedom.
+    assert auto > 1
+    assert abs(auto - common) < 1
 
 
 def test_unstated_errors_of_presses_fail_their_check():
@@ -158,6 +254,9 @@ def refused_scans():
     yield "pair", scan, {"crosstalk": [("T00", "T1")]}, MemscalError, "T01"
     yield "itself", scan, {"crosstalk": [("T01", "T01")]}, MemscalError, "no other sensor T01"
     slow = StressSensor(dynamics=Dynamics(low_pass=3.0))
+    for pairs in (None, ["T00"], [("T00",)]):
+        yield f"{pairs}", scan, {"crosstalk": pairs}, InputError, "pairs of names"
+    yield "beside", replace(scan, line_offset=0.5e-3), {}, InputError, "0.5 mm beside"
     yield "dynamics", replace(scan, sensor=slow), {}, InputError, "stress_sensor/dynamics"
     yield "silent", replace(scan, u_zz=0 * scan.u_zz), {}, FitError, "3 sensors"
 
