@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from memscal.errors import InputError
 from memscal.extensions.arrays.array_data import ArrayData
-from memscal.extensions.arrays.locate import Seeking, Touch, steps
+from memscal.extensions.arrays.locate import Seeking, Touch, fields_of, steps
 from memscal.model.arrays import FloatArray, finite_vector, floats, require_positive
 
 
@@ -32,7 +32,7 @@ def predict(
     array: ArrayData, places: ArrayLike, force: ArrayLike, indenter: Touch, shear: ArrayLike
 ) -> FloatArray:
     """Readings of contacts, (m, n): :meth:`SensorArray.predict`."""
-    fields = Seeking.on(array, indenter, 0.0).fields
+    fields = fields_of(array, indenter)
     state = states(places, force, shear)
     readings = np.full((len(state), len(array.sensors)), np.nan)
     readings[:, fields.sensors], _ = fields.forward(state[:, :2], state[:, 2], state[:, 3:])

@@ -4,6 +4,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
 
+from memscal.errors import InputError
 from memscal.extensions.arrays.array_data import ArrayData
 from memscal.extensions.arrays.bound import bound
 from memscal.extensions.arrays.locate import Seeking
@@ -16,8 +17,16 @@ _STEP = 0.1
 
 
 def bound_map(array: ArrayData, of_place: Axes, of_force: Axes) -> None:
-    """Draw u(x), in mm, and u(force), in percent, at a point and the load; of a row as curves."""
-    seeking = Seeking.on(array, "point", 0.0, _BEYOND)
+    """Draw u(x), in mm, and u(force), in percent, at a point and the load; of a row as curves.
+
+    Of a row that is along neither x nor y, with which nothing is located, there is none.
+    """
+    try:
+        seeking = Seeking.on(array, "point", 0.0, _BEYOND)
+    except InputError:
+        of_place.remove()
+        of_force.remove()
+        return
     axis = seeking.axes[0]
     name = "xy"[axis]
     places = seeking.grid(_STEP)

@@ -91,21 +91,15 @@ class Seeking:
     def on(cls, array: ArrayData, indenter: Touch, shear: float, margin: float = MARGIN) -> Seeking:
         """Return how contacts are sought on an array, up to so many thicknesses outside it."""
         require_non_negative("shear", shear)
-        if not (indenter == "point" or isinstance(indenter, Rod | Sphere)):
-            raise InputError(
-                f"The indenter is {indenter!r}.",
-                why="Receptive fields are calculated under a point, a rod, or a sphere.",
-                cure='Give "point", memscal.Rod(radius=...) or memscal.Sphere(radius=...).',
-            )
+        fields = fields_of(array, indenter)
         if array.kernel == "measured":
             # Only presses like those of the scan are known, and no place beyond it.
-            fields: Any = MeasuredFields(array)
             h = fields.scale
             margin = 0.0
             shear = 0.0
         else:
-            fields = receptive_fields(array, None if isinstance(indenter, str) else indenter)
             h = array.film.thickness
+            _refuse_slanted(fields.centres, _ON_A_LINE * h)
         told = np.ptp(fields.centres, axis=0) > _ON_A_LINE * h
         told[0] |= not told[1]
         beyond = told * margin * h
@@ -230,6 +224,32 @@ class Seeking:
     @property
     def _free(self) -> list[int]:
         return [*self.axes, 2, 3, 4]
+
+
+def fields_of(array: ArrayData, indenter: Touch) -> Any:
+    """Return the fields of an array under what presses."""
+    if not (indenter == "point" or isinstance(indenter, Rod | Sphere)):
+        raise InputError(
+            f"The indenter is {indenter!r}.",
+            why="Receptive fields are calculated under a point, a rod, or a sphere.",
+            cure='Give "point", memscal.Rod(radius=...) or memscal.Sphere(radius=...).',
+        )
+    if array.kernel == "measured":
+        return MeasuredFields(array)
+    return receptive_fields(array, None if isinstance(indenter, str) else indenter)
+
+
+def _refuse_slanted(centres: FloatArray, tolerance: float) -> None:
+    """Refuse a row that is along neither x nor y, by more than a tolerance in m."""
+    away = centres - centres.mean(axis=0)
+    across, along = np.linalg.eigh(away.T @ away)[1].T
+    if np.ptp(away @ across) < tolerance < np.ptp(away, axis=0).min():
+        angle = np.degrees(np.arctan(along[1] / along[0]))
+        raise InputError(
+            f"The sensors that are used lie in a row at {angle:.3g} degrees to x.",
+            why="A row does not tell how far beside it a contact presses: x and y are not known.",
+            cure="Turn the coordinates x and y of the scan so that the row lies along one of them.",
+        )
 
 
 def _whitener(noise: FloatArray, sensors: IndexArray, read: IndexArray) -> FloatArray:

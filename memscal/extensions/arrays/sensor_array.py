@@ -121,8 +121,8 @@ class SensorArray(ArrayData, Shown, Gridded):
         Raises
         ------
         InputError
-            If the number of columns is not that of the sensors, or indenter or shear make no
-            sense.
+            If the number of columns is not that of the sensors, indenter or shear make no sense,
+            or the sensors lie in a row that is along neither x nor y.
 
         Examples
         --------
@@ -191,7 +191,8 @@ class SensorArray(ArrayData, Shown, Gridded):
         Raises
         ------
         InputError
-            If the places have another shape, or forces, indenter or shear make no sense.
+            If the places have another shape, forces, indenter or shear make no sense, or the
+            sensors lie in a row that is along neither x nor y.
 
         Examples
         --------
@@ -246,7 +247,8 @@ class SensorArray(ArrayData, Shown, Gridded):
         ------
         InputError
             If the rate is not above zero, limits or drift make no sense, the indenter is another
-            one, or no more sensors are used than a contact has unknowns: 2 in a row, 3 in a grid.
+            one, the sensors lie in a row that is along neither x nor y, or no more are used than a
+            contact has unknowns: 2 in a row, 3 in a grid.
 
         Examples
         --------

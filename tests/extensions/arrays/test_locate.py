@@ -14,6 +14,7 @@ from helpers.true_arrays import TrueArray
 
 import memscal
 
+RATE = 100
 LINEAR = replace(FILM, law="linear")
 SPHERE = memscal.Sphere(radius=5e-3)
 
@@ -101,6 +102,41 @@ def test_of_a_row_y_is_that_of_the_row_and_not_known():
     assert np.isfinite(found.covariance[0][np.ix_([0, 2], [0, 2])]).all()
     assert "on the line of the row" in found.assumed
     assert "row" not in GRID.locate(TRUE_GRID.readings(np.zeros((1, 2)), 1.0)).assumed
+
+
+def turned(array, degrees):
+    """The same array turned about the origin, with known x and y of each sensor."""
+    angle = np.deg2rad(degrees)
+    axes = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    return replace(array, centres=array.places @ axes)
+
+
+@pytest.mark.parametrize(("count", "degrees"), [(6, 45.0), (6, 2.0), (6, 88.0), (2, -30.0)])
+def test_a_row_along_neither_x_nor_y_is_refused(count, degrees):
+    """Of it neither x nor y were known: places were 1.2 mm wrong, and forces by factors."""
+    straight = known_array(1, count)
+    array = turned(straight, degrees)
+    at_rest = np.zeros((1, count))
+    for work in (
+        lambda: array.locate(at_rest),
+        lambda: array.stream(RATE),
+        lambda: array.bound(at_rest[:, :2]),
+    ):
+        with pytest.raises(memscal.MemscalError, match=f"row at {degrees:g} degrees to x"):
+            work()
+    middle = [[0.0, 0.0]]
+    np.testing.assert_allclose(array.predict(middle), straight.predict(middle), rtol=1e-6)
+
+
+@pytest.mark.parametrize(("degrees", "told"), [(0.5, 0), (89.5, 1)])
+def test_a_row_nearly_along_an_axis_tells_the_place_along_it(degrees, told):
+    array = turned(ROW, degrees)
+    place = array.centres[2] + 0.5 * (array.centres[3] - array.centres[2])
+    found = array.locate(array.predict([place]), shear=0.0)
+    assert found.flags == ("",)
+    at = np.array([found.x[0], found.y[0]])
+    np.testing.assert_allclose(at, place, atol=0.05e-3)
+    assert np.flatnonzero(np.isfinite(found.uncertainties[0, :2])).tolist() == [told]
 
 
 def test_a_missing_frame_changes_no_other_one(seed):
