@@ -310,7 +310,7 @@ def locate(
         "no reading": blank,
         "too few readings": ~sought & ~blank,
         "no contact": sought & np.isnan(force),
-        "saturated": saturated.any(axis=1),
+        "saturated": saturated[:, fields.sensors].any(axis=1),
         "edge": outside | (seeking.outside(places) > seeking.near),
         "strong": force > fields.most,
         "misfit": p_value < FALSE_ALARM,

@@ -193,6 +193,14 @@ def test_readings_at_a_ceiling_are_left_out_and_said():
     assert raised.locate(clipped, indenter=ROD, shear=0.0).flags == ("saturated",)
 
 
+def test_a_dead_sensor_at_its_end_is_not_said():
+    """It would be said of every frame."""
+    array = replace(GRID, used=np.arange(16) != 5, reading_high=np.full(16, 1.0))
+    u = TRUE_GRID.readings(np.array([[0.3e-3, 0.2e-3]]), 1.0)
+    u[0, 5] = 1.0
+    assert "saturated" not in array.locate(u).flags[0]
+
+
 def test_readings_at_rest_are_subtracted_and_their_scatter_is_counted(seed):
     rng = np.random.default_rng(seed)
     offset = 1e-3 * rng.normal(size=16)
