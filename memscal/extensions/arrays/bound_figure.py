@@ -32,18 +32,18 @@ def bound_map(array: ArrayData, of_place: Axes, of_force: Axes) -> None:
     places = seeking.grid(_STEP)
     covariance = bound(array, places, array.load)
     x, y = places.T / MM
+    sensors = array.places[array.used] / MM
     for panel, i, scale, label in (
         (of_place, axis, MM, f"least $u({name})$ (mm)"),
         (of_force, 2, array.load / 100, "least $u$(force) (%)"),
     ):
         errors = np.sqrt(covariance[:, i, i]) / scale
-        centres = seeking.fields.centres / MM
         if len(seeking.axes) > 1:
             drawn = panel.tripcolor(x, y, errors, norm=LogNorm(), shading="gouraud")
             panel.figure.colorbar(drawn, ax=panel, label=label)
-            panel.plot(*centres.T, "s", mfc="none", color="white", ms=4)
+            panel.plot(*sensors.T, "s", mfc="none", color="white", ms=4)
             panel.set(aspect="equal", xlabel="$x$ (mm)", ylabel="$y$ (mm)")
         else:
             panel.plot(places[:, axis] / MM, errors, color=DECONVOLVED)
-            panel.vlines(centres[:, axis], errors.min(), errors.max(), color=MUTED, lw=0.5, ls=":")
+            panel.vlines(sensors[:, axis], errors.min(), errors.max(), color=MUTED, lw=0.5, ls=":")
             panel.set(yscale="log", xlabel=f"${name}$ (mm)", ylabel=label)
