@@ -48,7 +48,15 @@ def states(places: ArrayLike, force: ArrayLike, shear: ArrayLike) -> FloatArray:
             cure="Give rows of x and y in m.",
         )
     count = len(at)
-    forces = np.broadcast_to(floats(force), count)
-    stated = np.column_stack([at, forces, np.broadcast_to(floats(shear), (count, 2))])
+    try:
+        forces = np.broadcast_to(floats(force), count)
+        shears = np.broadcast_to(floats(shear), (count, 2))
+    except ValueError as error:
+        raise InputError(
+            f"Of {count} places the forces have shape {np.shape(force)}, and the shears "
+            f"{np.shape(shear)}.",
+            cure="Give one for all places, or one for each: a force, and x and y of the shear.",
+        ) from error
+    stated = np.column_stack([at, forces, shears])
     finite_vector("The array of places, forces and shears", stated.ravel())
     return stated

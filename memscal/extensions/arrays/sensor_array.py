@@ -160,8 +160,7 @@ class SensorArray(ArrayData, Shown, Gridded):
         Raises
         ------
         InputError
-            If the places have another shape, a number is not finite, or the indenter is another
-            one.
+            If an array has another shape, a number is not finite, or the indenter is another one.
 
         Notes
         -----

@@ -323,6 +323,9 @@ def test_what_makes_no_sense_is_refused(arguments, words):
     [
         (lambda: GRID.predict([[np.nan, 0.0]]), "not finite"),
         (lambda: GRID.predict([[0.0, 0.0]], np.nan), "not finite"),
+        (lambda: GRID.predict([[0.0, 0.0]], [1.0, 1.0, 1.0]), r"forces have shape \(3,\)"),
+        (lambda: GRID.predict(np.zeros((2, 2)), shear=np.ones((3, 2))), r"shears \(3, 2\)"),
+        (lambda: GRID.bound([[0.0, 0.0]], [1.0, 1.0]), r"forces have shape \(2,\)"),
         (lambda: GRID.bound([[0.0, 0.0]], 0.0), "force is 0 N"),
         (lambda: GRID.bound([[0.0, 0.0]], [1.0, -1.0]), "force is -1 N"),
     ],
