@@ -347,16 +347,23 @@ def columns_of(array: ArrayData, readings: ArrayLike, name: str) -> FloatArray:
 
 
 def _zero(array: ArrayData, rest: ArrayLike | None) -> ArrayPair:
-    """Return the readings without contact (n,), and the covariance of their error (n, n)."""
+    """Return the readings without contact (n,), and the covariance of their error (n, n).
+
+    Of few frames that of the readings is known in few directions: the scan's, in size no smaller
+    and that of the rest, counts as much as so many frames as there are sensors.
+    """
     if rest is None:
         return np.zeros(len(array.noise)), np.zeros_like(array.noise)
     frames = np.ma.masked_invalid(columns_of(array, rest, "rest"))
-    zero = frames.mean(axis=0).filled(np.nan)
-    if len(frames) == 1:
-        return zero, array.noise
-    # Masked arrays of numpy have no types.
-    scatter: Any = np.ma.cov(frames, rowvar=False)  # type: ignore[no-untyped-call]
-    return zero, scatter.filled(0.0) / len(frames)
+    zero = frames.mean(axis=0)
+    away = (frames - zero).filled(0.0)
+    used = array.used
+    free = np.maximum(frames.count(axis=0), 1) - 1
+    ratio = np.sum((away**2 / np.diag(array.noise))[:, used]) / max(free[used].sum(), 1)
+    known = used.sum()
+    products = away.T @ away + known * max(ratio, 1.0) * array.noise
+    share = ~np.ma.getmaskarray(frames) / ((free + 1) * np.sqrt(free + known))
+    return zero.filled(np.nan), products * (share.T @ share)
 
 
 def at_an_end(array: ArrayData, readings: FloatArray, *, tared: bool) -> BoolArray:

@@ -110,7 +110,7 @@ class SensorArray(ArrayData, Shown, Gridded):
             Standard deviation of each component of shear over normal force; 0: there is none.
         rest : array_like, shape (m, n) or (n,), optional
             Readings without contact on the same scale: their mean is subtracted, and the
-            uncertainty of the mean is counted.
+            uncertainty of the mean is counted (of few frames by the noise of the scan, or more).
 
         Returns
         -------

@@ -210,9 +210,23 @@ def test_readings_at_rest_are_subtracted_and_their_scatter_is_counted(seed):
     many = GRID.locate(u + offset, indenter=ROD, shear=0.0, rest=rest)
     assert many.x[0] == pytest.approx(plain.x[0], abs=1e-6)
     assert many.uncertainties[0, 0] == pytest.approx(plain.uncertainties[0, 0], rel=0.01)
-    # One frame at rest has the variance of the frame itself.
-    one = GRID.locate(u + offset, indenter=ROD, shear=0.0, rest=rest[0])
-    assert one.uncertainties[0, 0] == pytest.approx(2**0.5 * plain.uncertainties[0, 0], rel=0.1)
+    # The variance of their mean is that of the frame itself, over how many they are: of 2 frames
+    # their own scatter tells it in one direction of 16, which is nearly left out.
+    for count in (1, 2, 4):
+        few = GRID.locate(u + offset, indenter=ROD, shear=0.0, rest=rest[:count])
+        expected = (1 + 1 / count) ** 0.5 * plain.uncertainties[0, 0]
+        assert 0.96 * expected < few.uncertainties[0, 0] < 1.25 * expected
+    # Where the rest is noisier than the scan, so is the mean.
+    noisy = GRID.locate(u, indenter=ROD, shear=0.0, rest=10 * (rest[:2] - offset))
+    assert noisy.uncertainties[0, 0] > 4 * plain.uncertainties[0, 0]
+
+
+def test_missing_readings_at_rest_make_the_mean_less_sure(seed):
+    rest = noise_of(GRID, np.random.default_rng(seed), 400)
+    u = TRUE_GRID.readings(np.array([[1e-3, 0.5e-3]]), 1.0)
+    rest[4:] = np.nan
+    found, few = (GRID.locate(u, shear=0.0, rest=part) for part in (rest, rest[:4]))
+    np.testing.assert_allclose(found.uncertainties, few.uncertainties)
 
 
 def test_noise_alone_is_no_contact(seed):
