@@ -19,7 +19,7 @@ def read_frames(array: ArrayData, path: FilePath) -> tuple[FloatArray, Values]:
 
     Its columns may be in any order; those of another array are refused.
     """
-    table = open_table(path)
+    table = open_table(path, gaps=True)
     carries = [name for name in _CARRIED if name in table.heads and name not in array.sensors]
     lacking = [name for name in array.sensors if name not in table.heads]
     others = [name for name in table.heads if name not in (*array.sensors, *carries)]

@@ -13,6 +13,7 @@ from helpers.schemas import faults
 from helpers.true_arrays import TrueArray
 
 import memscal
+from memscal.extensions.arrays.frames import read_frames
 
 RATE = 100
 LINEAR = replace(FILM, law="linear")
@@ -394,6 +395,29 @@ def test_the_command_writes_the_table_of_contacts(files, run):
     assert rows[0]["y_errors [mm]"] == ""
     assert (rows[2]["x [mm]"], rows[2]["flags"]) == ("", "no reading")
     assert run(*arguments).code == 4
+
+
+@pytest.mark.parametrize("delimiter", [",", "\t"])
+@pytest.mark.parametrize("word", ["", "nan"])
+@pytest.mark.parametrize("empty", [[0, 1], [1], [0, 1, 2]])
+def test_empty_frames_are_kept_wherever_they_stand(tmp_path, delimiter, word, empty):
+    """At the beginning they were taken for a part of the head."""
+    rows = [[word] * 6 if i in empty else [f"{i}.5"] * 6 for i in range(3)]
+    rows.insert(0, [f"{name} [mV]" for name in ROW.sensors])
+    (tmp_path / "f.csv").write_text("".join(delimiter.join(row) + "\n" for row in rows))
+    found, _ = read_frames(ROW, tmp_path / "f.csv")
+    expected = [np.nan if i in empty else 1e-3 * (i + 0.5) for i in range(3)]
+    np.testing.assert_allclose(found, np.tile(expected, (6, 1)).T)
+
+
+def test_empty_rows_of_a_workbook_are_frames(tmp_path):
+    openpyxl = pytest.importorskip("openpyxl")
+    book = openpyxl.Workbook()
+    for row in ([f"{name} [mV]" for name in ROW.sensors], [], [1.5] * 6, [], [2.5] * 6):
+        book.active.append(row)
+    book.save(tmp_path / "f.xlsx")
+    found, _ = read_frames(ROW, tmp_path / "f.xlsx")
+    np.testing.assert_allclose(found[:, 0], [np.nan, 1.5e-3, np.nan, 2.5e-3])
 
 
 def test_frames_of_another_array_are_refused_and_nothing_is_written(files, run):
