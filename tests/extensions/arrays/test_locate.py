@@ -436,6 +436,25 @@ def test_frames_of_another_array_are_refused_and_nothing_is_written(files, run):
         assert not (files / "c.csv").exists()
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("\n11,", "\n11,OL", "'OL'"),
+        ("\n11,", "\n11,9.9E37", "9.9E37"),
+        (" [mV]", "", "no unit"),
+        ("T00 [mV]", "T00 [mV],T00 [V]", "several columns 'T00'"),
+    ],
+)
+def test_what_cures_a_table_is_in_it_not_an_option_of_import(files, run, old, new, words):
+    table = files / "frames.csv"
+    table.write_text(table.read_text().replace(old, new))
+    done = run("locate", files / "array.h5", table)
+    assert done.code == 3
+    assert words in done.err
+    assert "Correct the table" in done.err
+    assert "--" not in done.err
+
+
 def test_the_artifact_of_one_sensor_is_no_array(files, run):
     memscal.calibrate(memscal.simulate(seed=1)).apparatus.save(files / "one.h5")
     done = run("locate", files / "one.h5", files / "frames.csv", "-o", files / "c.csv")
