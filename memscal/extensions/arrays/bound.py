@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from memscal.errors import InputError
 from memscal.extensions.arrays.array_data import ArrayData
-from memscal.extensions.arrays.locate import Seeking, Touch, steps
+from memscal.extensions.arrays.locate import Seeking, Touch, fields_of, steps
 from memscal.model.arrays import FloatArray, finite_vector, floats, require_positive
 
 
@@ -32,7 +32,7 @@ def predict(
     array: ArrayData, places: ArrayLike, force: ArrayLike, indenter: Touch, shear: ArrayLike
 ) -> FloatArray:
     """Readings of contacts, (m, n): :meth:`SensorArray.predict`."""
-    fields = Seeking.on(array, indenter, 0.0).fields
+    fields = fields_of(array, indenter)
     state = states(places, force, shear)
     readings = np.full((len(state), len(array.sensors)), np.nan)
     readings[:, fields.sensors], _ = fields.forward(state[:, :2], state[:, 2], state[:, 3:])
@@ -48,7 +48,15 @@ def states(places: ArrayLike, force: ArrayLike, shear: ArrayLike) -> FloatArray:
             cure="Give rows of x and y in m.",
         )
     count = len(at)
-    forces = np.broadcast_to(floats(force), count)
-    stated = np.column_stack([at, forces, np.broadcast_to(floats(shear), (count, 2))])
+    try:
+        forces = np.broadcast_to(floats(force), count)
+        shears = np.broadcast_to(floats(shear), (count, 2))
+    except ValueError as error:
+        raise InputError(
+            f"Of {count} places the forces have shape {np.shape(force)}, and the shears "
+            f"{np.shape(shear)}.",
+            cure="Give one for all places, or one for each: a force, and x and y of the shear.",
+        ) from error
+    stated = np.column_stack([at, forces, shears])
     finite_vector("The array of places, forces and shears", stated.ravel())
     return stated

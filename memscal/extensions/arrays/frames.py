@@ -1,8 +1,12 @@
 """Frames of an array from a table: one row for each, one column for each sensor, by name."""
 
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 import numpy as np
 
-from memscal.errors import FormatError
+from memscal.errors import FormatError, InputError
 from memscal.extensions.arrays.array_data import ArrayData
 from memscal.formats.files import FilePath
 from memscal.formats.tables.columns import Wanted
@@ -13,13 +17,34 @@ from memscal.model.quantities import dimension_in
 #: Columns that are no readings, where no sensor has their name.
 _CARRIED = ("frame", "t")
 
+#: What locate does not have: options of import, and numbers of columns.
+_UNKNOWN = "--|number of the column"
 
+
+@contextmanager
+def _without_options() -> Iterator[None]:
+    """Say what cures a table of frames where the cure would be an option of import."""
+    try:
+        yield
+    except InputError as error:
+        if not re.search(_UNKNOWN, error.cure):
+            raise
+        raise type(error)(
+            error.problem,
+            why="" if "--" in error.why else error.why,
+            cure="Correct the table: one head with each sensor once and its unit ('T00 [mV]'), "
+            "below it numbers with a decimal point, parted by commas, and empty cells where a "
+            "sensor did not read or was overloaded.",
+        ) from error
+
+
+@_without_options()
 def read_frames(array: ArrayData, path: FilePath) -> tuple[FloatArray, Values]:
     """Return readings (frames, sensors), and ``frame`` and ``time`` where they stand in a table.
 
     Its columns may be in any order; those of another array are refused.
     """
-    table = open_table(path)
+    table = open_table(path, gaps=True)
     carries = [name for name in _CARRIED if name in table.heads and name not in array.sensors]
     lacking = [name for name in array.sensors if name not in table.heads]
     others = [name for name in table.heads if name not in (*array.sensors, *carries)]

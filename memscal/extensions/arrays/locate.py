@@ -91,21 +91,15 @@ class Seeking:
     def on(cls, array: ArrayData, indenter: Touch, shear: float, margin: float = MARGIN) -> Seeking:
         """Return how contacts are sought on an array, up to so many thicknesses outside it."""
         require_non_negative("shear", shear)
-        if not (indenter == "point" or isinstance(indenter, Rod | Sphere)):
-            raise InputError(
-                f"The indenter is {indenter!r}.",
-                why="Receptive fields are calculated under a point, a rod, or a sphere.",
-                cure='Give "point", memscal.Rod(radius=...) or memscal.Sphere(radius=...).',
-            )
+        fields = fields_of(array, indenter)
         if array.kernel == "measured":
             # Only presses like those of the scan are known, and no place beyond it.
-            fields: Any = MeasuredFields(array)
             h = fields.scale
             margin = 0.0
             shear = 0.0
         else:
-            fields = receptive_fields(array, None if isinstance(indenter, str) else indenter)
             h = array.film.thickness
+            _refuse_slanted(fields.centres, _ON_A_LINE * h)
         told = np.ptp(fields.centres, axis=0) > _ON_A_LINE * h
         told[0] |= not told[1]
         beyond = told * margin * h
@@ -232,6 +226,32 @@ class Seeking:
         return [*self.axes, 2, 3, 4]
 
 
+def fields_of(array: ArrayData, indenter: Touch) -> Any:
+    """Return the fields of an array under what presses."""
+    if not (indenter == "point" or isinstance(indenter, Rod | Sphere)):
+        raise InputError(
+            f"The indenter is {indenter!r}.",
+            why="Receptive fields are calculated under a point, a rod, or a sphere.",
+            cure='Give "point", memscal.Rod(radius=...) or memscal.Sphere(radius=...).',
+        )
+    if array.kernel == "measured":
+        return MeasuredFields(array)
+    return receptive_fields(array, None if isinstance(indenter, str) else indenter)
+
+
+def _refuse_slanted(centres: FloatArray, tolerance: float) -> None:
+    """Refuse a row that is along neither x nor y, by more than a tolerance in m."""
+    away = centres - centres.mean(axis=0)
+    across, along = np.linalg.eigh(away.T @ away)[1].T
+    if np.ptp(away @ across) < tolerance < np.ptp(away, axis=0).min():
+        angle = np.degrees(np.arctan(along[1] / along[0]))
+        raise InputError(
+            f"The sensors that are used lie in a row at {angle:.3g} degrees to x.",
+            why="A row does not tell how far beside it a contact presses: x and y are not known.",
+            cure="Turn the coordinates x and y of the scan so that the row lies along one of them.",
+        )
+
+
 def _whitener(noise: FloatArray, sensors: IndexArray, read: IndexArray) -> FloatArray:
     """Return what makes white the noise of some of the sensors; what others read has no weight."""
     root = np.linalg.cholesky(noise[np.ix_(read, read)])
@@ -290,7 +310,7 @@ def locate(
         "no reading": blank,
         "too few readings": ~sought & ~blank,
         "no contact": sought & np.isnan(force),
-        "saturated": saturated.any(axis=1),
+        "saturated": saturated[:, fields.sensors].any(axis=1),
         "edge": outside | (seeking.outside(places) > seeking.near),
         "strong": force > fields.most,
         "misfit": p_value < FALSE_ALARM,
@@ -327,16 +347,23 @@ def columns_of(array: ArrayData, readings: ArrayLike, name: str) -> FloatArray:
 
 
 def _zero(array: ArrayData, rest: ArrayLike | None) -> ArrayPair:
-    """Return the readings without contact (n,), and the covariance of their error (n, n)."""
+    """Return the readings without contact (n,), and the covariance of their error (n, n).
+
+    Of few frames that of the readings is known in few directions: the scan's, in size no smaller
+    and that of the rest, counts as much as so many frames as there are sensors.
+    """
     if rest is None:
         return np.zeros(len(array.noise)), np.zeros_like(array.noise)
     frames = np.ma.masked_invalid(columns_of(array, rest, "rest"))
-    zero = frames.mean(axis=0).filled(np.nan)
-    if len(frames) == 1:
-        return zero, array.noise
-    # Masked arrays of numpy have no types.
-    scatter: Any = np.ma.cov(frames, rowvar=False)  # type: ignore[no-untyped-call]
-    return zero, scatter.filled(0.0) / len(frames)
+    zero = frames.mean(axis=0)
+    away = (frames - zero).filled(0.0)
+    used = array.used
+    free = np.maximum(frames.count(axis=0), 1) - 1
+    ratio = np.sum((away**2 / np.diag(array.noise))[:, used]) / max(free[used].sum(), 1)
+    known = used.sum()
+    products = away.T @ away + known * max(ratio, 1.0) * array.noise
+    share = ~np.ma.getmaskarray(frames) / ((free + 1) * np.sqrt(free + known))
+    return zero.filled(np.nan), products * (share.T @ share)
 
 
 def at_an_end(array: ArrayData, readings: FloatArray, *, tared: bool) -> BoolArray:

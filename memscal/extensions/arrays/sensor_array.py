@@ -110,7 +110,7 @@ class SensorArray(ArrayData, Shown, Gridded):
             Standard deviation of each component of shear over normal force; 0: there is none.
         rest : array_like, shape (m, n) or (n,), optional
             Readings without contact on the same scale: their mean is subtracted, and the
-            uncertainty of the mean is counted.
+            uncertainty of the mean is counted (of few frames by the noise of the scan, or more).
 
         Returns
         -------
@@ -121,8 +121,8 @@ class SensorArray(ArrayData, Shown, Gridded):
         Raises
         ------
         InputError
-            If the number of columns is not that of the sensors, or indenter or shear make no
-            sense.
+            If the number of columns is not that of the sensors, indenter or shear make no sense,
+            or the sensors lie in a row that is along neither x nor y.
 
         Examples
         --------
@@ -160,8 +160,7 @@ class SensorArray(ArrayData, Shown, Gridded):
         Raises
         ------
         InputError
-            If the places have another shape, a number is not finite, or the indenter is another
-            one.
+            If an array has another shape, a number is not finite, or the indenter is another one.
 
         Notes
         -----
@@ -191,7 +190,8 @@ class SensorArray(ArrayData, Shown, Gridded):
         Raises
         ------
         InputError
-            If the places have another shape, or forces, indenter or shear make no sense.
+            If the places have another shape, forces, indenter or shear make no sense, or the
+            sensors lie in a row that is along neither x nor y.
 
         Examples
         --------
@@ -246,7 +246,8 @@ class SensorArray(ArrayData, Shown, Gridded):
         ------
         InputError
             If the rate is not above zero, limits or drift make no sense, the indenter is another
-            one, or no more sensors are used than a contact has unknowns: 2 in a row, 3 in a grid.
+            one, the sensors lie in a row that is along neither x nor y, or no more are used than a
+            contact has unknowns: 2 in a row, 3 in a grid.
 
         Examples
         --------

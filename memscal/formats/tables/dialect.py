@@ -93,12 +93,12 @@ def is_number(cell: str) -> bool:
     return NUMBER.fullmatch(cell) is not None
 
 
-def first_of_numbers(rows: Rows, missing: Set[str]) -> int | None:
-    """Return the first row of a table, below preamble, header and units; none without numbers."""
+def first_of_numbers(rows: Rows, missing: Set[str]) -> int:
+    """Return the first row of a table, below preamble, header and units, or how many there are."""
     counts = [sum(map(is_number, row)) for row in rows]
     most = min(2, max(counts, default=0))
     if not most:
-        return None
+        return len(rows)
     dense = [row for row, count in zip(rows, counts, strict=True) if count >= most]
     numeric = []
     for i, column in enumerate(zip_longest(*dense[-_LAST:], fillvalue="")):

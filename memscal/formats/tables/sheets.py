@@ -53,10 +53,13 @@ _SAID = rb'<\1c \2 t="str"><\1v>a formula without a stored result</\1v></\1c>'
 _MAX_NAME = 80
 
 
-def open_table(source: Any, named: Mapping[str, Any] = _NONE, **reading: Any) -> NamedColumns:
+def open_table(
+    source: Any, named: Mapping[str, Any] = _NONE, *, gaps: bool = False, **reading: Any
+) -> NamedColumns:
     """Open a table of any kind: a path, or columns in memory (a mapping, a data frame).
 
     ``named`` are the columns of a scan that are asked for, or ``None``, by the names of its arrays.
+    With ``gaps`` rows below the head are readings though nothing stands in them.
     """
     reading = {name: value for name, value in reading.items() if value or value == 0}
     path = isinstance(source, str) or hasattr(source, "__fspath__")
@@ -72,7 +75,7 @@ def open_table(source: Any, named: Mapping[str, Any] = _NONE, **reading: Any) ->
         options = ", ".join(f"{name} (--{name.replace('_', '-')})" for name in useless)
         raise InputError(f"{options} has no effect on a {kind}.", cure="Leave it out.")
     if kind == "text":
-        return TextTable(source, **reading)
+        return TextTable(source, gaps=gaps, **reading)
     if not path:
         return _columns_in_memory(source, **reading)
     if ending not in _KINDS:
@@ -81,7 +84,7 @@ def open_table(source: Any, named: Mapping[str, Any] = _NONE, **reading: Any) ->
     name = PurePath(source).name
     with _reading(f"{name} cannot be read"):
         if kind == "workbook":
-            return _sheet_table(name, read_bytes(source), **reading)
+            return _sheet_table(name, read_bytes(source), gaps=gaps, **reading)
         return _parquet_table(name, read_bytes(source), **reading)
 
 
@@ -117,7 +120,8 @@ def _sheet_table(name: str, data: bytes, *, sheet: str | None = None, **reading:
     for row in Task("rows", claimed).counted(chosen.iter_rows(values_only=True)):
         cells += max(len(row), 1)
         _limit(name, cells, MOST_TAGS, "cells")
-        text.write("\t".join(map(_cell, row)).encode() + b"\n")
+        # An empty row is one of empty cells.
+        text.write(("\t".join(map(_cell, row)) or "\t").encode() + b"\n")
     cure = (
         f"Name the sheet of the table (--sheet): {', '.join(book.sheetnames)}. Of formulas the "
         "results must be stored: save it in a spreadsheet program."

@@ -64,7 +64,8 @@ class Sheet(NamedTuple):
 class TextTable(NamedColumns):
     """A delimited text whose head was read; its columns are read once, in blocks.
 
-    ``#`` or ``%`` begin a comment. What stands above the header is kept in the notes.
+    ``#`` or ``%`` begin a comment. What stands above the header is kept in the notes. With ``gaps``
+    rows of missing values alone begin the table, too, and lines of tabs alone are such rows.
     """
 
     def __init__(
@@ -76,10 +77,12 @@ class TextTable(NamedColumns):
         missing: Sequence[str] = (),
         skip_rows: int | None = None,
         sheet: Sheet | None = None,
+        gaps: bool = False,
     ) -> None:
         super().__init__(os.path.basename(os.fspath(path)), missing)
         self._path = path
         self._sheet = sheet
+        self._gaps = gaps
         self._row = "row" if sheet else "line"
         self._digest = hashlib.sha256()
         self._latin = False
@@ -123,7 +126,9 @@ class TextTable(NamedColumns):
         cut, places = self._rows(lines)
         rows = [[cell.strip() for cell in row] for row in cut]
         start = first_of_numbers(rows, self._missing)
-        if start is None:
+        while self._gaps and start and self._missing.issuperset(map(str.lower, rows[start - 1])):
+            start -= 1
+        if start == len(rows):
             sheet = f"sheet {self._sheet.name!r} of " if self._sheet else ""
             cure = self._sheet.cure if self._sheet else "Give a table with rows of numbers."
             why = "Units stand in its cells." if any(map(holds_unit, rows[-1])) else ""
@@ -247,8 +252,8 @@ class TextTable(NamedColumns):
         stated = self._columns
         by_blanks = self._delimiter == " "
         for row, place in zip(rows, places, strict=True):
-            # An empty last cell is none: rows may end in a delimiter.
-            self._reach = max(self._reach, len(row) - (not row[-1].strip()))
+            # An empty last cell is none, but with gaps: rows may end in a delimiter.
+            self._reach = max(self._reach, len(row) - (not (self._gaps or row[-1].strip())))
             # Between delimiters cells may be missing at the end.
             if not any(map(str.strip, row[stated:])) and not (by_blanks and len(row) < stated):
                 continue
@@ -383,7 +388,7 @@ class TextTable(NamedColumns):
         lines = Numbered()
         comments = Numbered()
         for number, line in enumerate(self._table_of(written), self._line):
-            if CELLS.match(line):
+            if CELLS.match(line) or (self._gaps and "\t" in line and line.isspace()):
                 lines.append((number, line))
             elif line.strip():
                 comments.append((number, line))
@@ -399,7 +404,7 @@ class TextTable(NamedColumns):
         places = [number for number, _ in lines]
         texts = [line for _, line in lines]
         if self._delimiter == " ":
-            rows = [words_of(line) for line in texts]
+            rows = [words_of(line) or [""] for line in texts]
         else:
             try:
                 reader = csv.reader(texts, delimiter=self._delimiter, skipinitialspace=True)

@@ -13,7 +13,9 @@ from helpers.schemas import faults
 from helpers.true_arrays import TrueArray
 
 import memscal
+from memscal.extensions.arrays.frames import read_frames
 
+RATE = 100
 LINEAR = replace(FILM, law="linear")
 SPHERE = memscal.Sphere(radius=5e-3)
 
@@ -103,6 +105,41 @@ def test_of_a_row_y_is_that_of_the_row_and_not_known():
     assert "row" not in GRID.locate(TRUE_GRID.readings(np.zeros((1, 2)), 1.0)).assumed
 
 
+def turned(array, degrees):
+    """The same array turned about the origin, with known x and y of each sensor."""
+    angle = np.deg2rad(degrees)
+    axes = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    return replace(array, centres=array.places @ axes)
+
+
+@pytest.mark.parametrize(("count", "degrees"), [(6, 45.0), (6, 2.0), (6, 88.0), (2, -30.0)])
+def test_a_row_along_neither_x_nor_y_is_refused(count, degrees):
+    """Of it neither x nor y were known: places were 1.2 mm wrong, and forces by factors."""
+    straight = known_array(1, count)
+    array = turned(straight, degrees)
+    at_rest = np.zeros((1, count))
+    for work in (
+        lambda: array.locate(at_rest),
+        lambda: array.stream(RATE),
+        lambda: array.bound(at_rest[:, :2]),
+    ):
+        with pytest.raises(memscal.MemscalError, match=f"row at {degrees:g} degrees to x"):
+            work()
+    middle = [[0.0, 0.0]]
+    np.testing.assert_allclose(array.predict(middle), straight.predict(middle), rtol=1e-6)
+
+
+@pytest.mark.parametrize(("degrees", "told"), [(0.5, 0), (89.5, 1)])
+def test_a_row_nearly_along_an_axis_tells_the_place_along_it(degrees, told):
+    array = turned(ROW, degrees)
+    place = array.centres[2] + 0.5 * (array.centres[3] - array.centres[2])
+    found = array.locate(array.predict([place]), shear=0.0)
+    assert found.flags == ("",)
+    at = np.array([found.x[0], found.y[0]])
+    np.testing.assert_allclose(at, place, atol=0.05e-3)
+    assert np.flatnonzero(np.isfinite(found.uncertainties[0, :2])).tolist() == [told]
+
+
 def test_a_missing_frame_changes_no_other_one(seed):
     rng = np.random.default_rng(seed)
     places, forces = drawn(GRID, rng, 9)
@@ -157,6 +194,14 @@ def test_readings_at_a_ceiling_are_left_out_and_said():
     assert raised.locate(clipped, indenter=ROD, shear=0.0).flags == ("saturated",)
 
 
+def test_a_dead_sensor_at_its_end_is_not_said():
+    """It would be said of every frame."""
+    array = replace(GRID, used=np.arange(16) != 5, reading_high=np.full(16, 1.0))
+    u = TRUE_GRID.readings(np.array([[0.3e-3, 0.2e-3]]), 1.0)
+    u[0, 5] = 1.0
+    assert "saturated" not in array.locate(u).flags[0]
+
+
 def test_readings_at_rest_are_subtracted_and_their_scatter_is_counted(seed):
     rng = np.random.default_rng(seed)
     offset = 1e-3 * rng.normal(size=16)
@@ -166,9 +211,23 @@ def test_readings_at_rest_are_subtracted_and_their_scatter_is_counted(seed):
     many = GRID.locate(u + offset, indenter=ROD, shear=0.0, rest=rest)
     assert many.x[0] == pytest.approx(plain.x[0], abs=1e-6)
     assert many.uncertainties[0, 0] == pytest.approx(plain.uncertainties[0, 0], rel=0.01)
-    # One frame at rest has the variance of the frame itself.
-    one = GRID.locate(u + offset, indenter=ROD, shear=0.0, rest=rest[0])
-    assert one.uncertainties[0, 0] == pytest.approx(2**0.5 * plain.uncertainties[0, 0], rel=0.1)
+    # The variance of their mean is that of the frame itself, over how many they are: of 2 frames
+    # their own scatter tells it in one direction of 16, which is nearly left out.
+    for count in (1, 2, 4):
+        few = GRID.locate(u + offset, indenter=ROD, shear=0.0, rest=rest[:count])
+        expected = (1 + 1 / count) ** 0.5 * plain.uncertainties[0, 0]
+        assert 0.96 * expected < few.uncertainties[0, 0] < 1.25 * expected
+    # Where the rest is noisier than the scan, so is the mean.
+    noisy = GRID.locate(u, indenter=ROD, shear=0.0, rest=10 * (rest[:2] - offset))
+    assert noisy.uncertainties[0, 0] > 4 * plain.uncertainties[0, 0]
+
+
+def test_missing_readings_at_rest_make_the_mean_less_sure(seed):
+    rest = noise_of(GRID, np.random.default_rng(seed), 400)
+    u = TRUE_GRID.readings(np.array([[1e-3, 0.5e-3]]), 1.0)
+    rest[4:] = np.nan
+    found, few = (GRID.locate(u, shear=0.0, rest=part) for part in (rest, rest[:4]))
+    np.testing.assert_allclose(found.uncertainties, few.uncertainties)
 
 
 def test_noise_alone_is_no_contact(seed):
@@ -279,6 +338,9 @@ def test_what_makes_no_sense_is_refused(arguments, words):
     [
         (lambda: GRID.predict([[np.nan, 0.0]]), "not finite"),
         (lambda: GRID.predict([[0.0, 0.0]], np.nan), "not finite"),
+        (lambda: GRID.predict([[0.0, 0.0]], [1.0, 1.0, 1.0]), r"forces have shape \(3,\)"),
+        (lambda: GRID.predict(np.zeros((2, 2)), shear=np.ones((3, 2))), r"shears \(3, 2\)"),
+        (lambda: GRID.bound([[0.0, 0.0]], [1.0, 1.0]), r"forces have shape \(2,\)"),
         (lambda: GRID.bound([[0.0, 0.0]], 0.0), "force is 0 N"),
         (lambda: GRID.bound([[0.0, 0.0]], [1.0, -1.0]), "force is -1 N"),
     ],
@@ -335,6 +397,29 @@ def test_the_command_writes_the_table_of_contacts(files, run):
     assert run(*arguments).code == 4
 
 
+@pytest.mark.parametrize("delimiter", [",", "\t"])
+@pytest.mark.parametrize("word", ["", "nan"])
+@pytest.mark.parametrize("empty", [[0, 1], [1], [0, 1, 2]])
+def test_empty_frames_are_kept_wherever_they_stand(tmp_path, delimiter, word, empty):
+    """At the beginning they were taken for a part of the head."""
+    rows = [[word] * 6 if i in empty else [f"{i}.5"] * 6 for i in range(3)]
+    rows.insert(0, [f"{name} [mV]" for name in ROW.sensors])
+    (tmp_path / "f.csv").write_text("".join(delimiter.join(row) + "\n" for row in rows))
+    found, _ = read_frames(ROW, tmp_path / "f.csv")
+    expected = [np.nan if i in empty else 1e-3 * (i + 0.5) for i in range(3)]
+    np.testing.assert_allclose(found, np.tile(expected, (6, 1)).T)
+
+
+def test_empty_rows_of_a_workbook_are_frames(tmp_path):
+    openpyxl = pytest.importorskip("openpyxl")
+    book = openpyxl.Workbook()
+    for row in ([f"{name} [mV]" for name in ROW.sensors], [], [1.5] * 6, [], [2.5] * 6):
+        book.active.append(row)
+    book.save(tmp_path / "f.xlsx")
+    found, _ = read_frames(ROW, tmp_path / "f.xlsx")
+    np.testing.assert_allclose(found[:, 0], [np.nan, 1.5e-3, np.nan, 2.5e-3])
+
+
 def test_frames_of_another_array_are_refused_and_nothing_is_written(files, run):
     table = files / "frames.csv"
     stated = table.read_text()
@@ -349,6 +434,25 @@ def test_frames_of_another_array_are_refused_and_nothing_is_written(files, run):
         assert done.code == 3
         assert all(word in done.err for word in words)
         assert not (files / "c.csv").exists()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("\n11,", "\n11,OL", "'OL'"),
+        ("\n11,", "\n11,9.9E37", "9.9E37"),
+        (" [mV]", "", "no unit"),
+        ("T00 [mV]", "T00 [mV],T00 [V]", "several columns 'T00'"),
+    ],
+)
+def test_what_cures_a_table_is_in_it_not_an_option_of_import(files, run, old, new, words):
+    table = files / "frames.csv"
+    table.write_text(table.read_text().replace(old, new))
+    done = run("locate", files / "array.h5", table)
+    assert done.code == 3
+    assert words in done.err
+    assert "Correct the table" in done.err
+    assert "--" not in done.err
 
 
 def test_the_artifact_of_one_sensor_is_no_array(files, run):

@@ -55,6 +55,12 @@ def test_fields_that_change_sign_place_presses_of_other_sizes(array, rng):
     assert "presses like those of the scan" in found.answer()
 
 
+def test_the_map_of_the_bound_shows_the_sensors(array):
+    """It showed corners of the raster."""
+    drawn = array.plot().axes[0].lines[0].get_xydata()
+    np.testing.assert_allclose(1e-3 * drawn, PLACES, atol=1.5 * STEP)
+
+
 def test_the_maps_are_smoother_than_the_readings(array):
     readings = array.readings
     true = fields(np.stack([readings.x, readings.y], axis=1)).T

@@ -73,6 +73,13 @@ def test_all_arrays_and_correlated_numbers_are_there_in_si_units():
     assert float(dataset["centre_x"].sel(sensor="T01")) == array.centres[1, 0]
 
 
+def test_a_row_along_neither_x_nor_y_has_a_figure_without_the_map_of_the_bound():
+    array = full_array(1, 3)
+    slanted = replace(array, centres=array.places[:, :1] * [1.0, 1.0])
+    labels = [axes.get_label() for axes in slanted.plot().axes]
+    assert labels[:5] == list("abcdg")
+
+
 @pytest.mark.parametrize("size", [(1, 3), (4, 5)])
 def test_figure_and_page_show_the_array(tmp_path, size):
     array = full_array(*size, **identified(passed=size[0] == 1))
