@@ -124,10 +124,10 @@ dead_taxels: sensors without a signal
 ends_covered: what a scan lacks of two thicknesses beyond the last sensor
     scan farther
 layout: centres against their layout, shifted, turned up to 30 degrees, scaled up to 50 %
-    wrong place, name, unit or axis
+    wrong place, name, unit or axis; sensors beside a single line
 crosstalk_identified: median u of the crosstalk by the readings alone
     scan a raster, take a common shape, or a thinner film
-crosstalk_model: A and crosstalk by a common against own shapes, in u
+crosstalk_model: A and crosstalk by a common G against own widths, or shapes of a raster, in u
     own shapes, of a raster
 common_kernel: fall of chi-square by widths of the sensors' own
     own shapes, of a raster
