@@ -10,12 +10,15 @@ per newton of a contact at r:
     z(r) = \frac{H^T S^{-1} e}{\sqrt{H^T S^{-1} H}}
 
 A frame has a contact if z exceeds 6 at a node of a grid of places; that of a block is kept out of
-the baselines from 3.5 on.  With J = [H_x, H_y, H] at its place, and M = S^-1 without a contact,
+the baselines from 3.5 on.  With J = [H_x, H_y, H] where it stays, and M = S^-1 without a contact,
 
 .. math::
 
     M = S^{-1} - S^{-1} J (J^T S^{-1} J)^{-1} J^T S^{-1}, \quad
     b \leftarrow b + P M e, \quad P \leftarrow P - P M P .
+
+The place of J is a mean over all blocks in which a contact stays.  At that of each block by itself,
+with its noise, the filter would believe to see more and more of what the contact hides.
 
 Drift is common to all sensors and a contact is local: that separates them, and not a constant of
 time.  The random walks have :math:`Q = q_c 1 1^T + q I`; the filter runs at several strengths of
@@ -72,6 +75,8 @@ _DIGITS = 2.0 ** np.array([0, 20, 40])
 #: which that of a block is kept out of the baselines: long before it is seen in a frame.
 _FOUND = 6.0
 _SPARED = 3.5
+#: A contact has moved if its place differs from the mean by so many standard uncertainties.
+_MOVED = 4.0
 #: Random walks of single sensors in 1 s, over the array's largest reading; the common one over it.
 #: The first holds until the readings tell.
 _STRENGTHS = np.array([0.04, 0.008, 0.2]) / 100
@@ -181,6 +186,9 @@ class Stream:
             # Seconds, and the share of blocks that a sensor alone contradicts.
             unchanged=np.zeros(n),
             doubt=np.zeros(n),
+            # Mean place of a contact that stays, and 1 over its variance; 0 without one.
+            place=np.zeros(2),
+            sureness=np.array(0.0),
             # By strength of the drift; a baseline that is not known is NaN.
             baselines=np.full((own.size, n), np.nan),
             covariance=np.zeros((own.size, n, n)),
@@ -406,7 +414,7 @@ class Stream:
         summed = now.covariance + noise + self._unknown * np.diag(~seen)
         fit = self._fit(deviations[[best]], np.linalg.inv(summed[best]), _SPARED)
         # Slopes of a place nearby would let what they miss into the baselines, block by block.
-        jacobian = self._slopes(fit.place, fit.force).reshape(-1, seen.size)
+        jacobian = self._slopes(self._stays(fit), fit.force).reshape(-1, seen.size)
         for node in fit.node:
             summed += fit.force**2 * self._errors_at(node)[0]
         weight = np.linalg.inv(summed)
@@ -434,6 +442,20 @@ class Stream:
         now.covariance -= gain @ now.covariance
         # By rounding alone it would grow asymmetric, from block to block.
         now.covariance = (now.covariance + now.covariance.swapaxes(1, 2)) / 2
+
+    def _stays(self, fit: _Fit) -> FloatArray:
+        """Return the mean place of a block's contact and what it was before, (f, 2), f = 0 or 1."""
+        now = self._now
+        if fit.rows.size == 0:
+            now.sureness[...] = 0.0
+            return fit.place
+        variance = np.trace(fit.covariance[0, :-1, :-1]) / fit.force[0] ** 2
+        [away] = fit.place - now.place
+        if away @ away > _MOVED**2 * variance:
+            now.sureness[...] = 0.0
+        now.sureness += 1 / variance
+        now.place += away / (variance * now.sureness)
+        return floats(now.place[None].copy())
 
 
 def _linear_step(
