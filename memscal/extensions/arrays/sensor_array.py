@@ -216,7 +216,7 @@ class SensorArray(ArrayData, Shown, Gridded):
         Baselines are tracked by a Kalman filter in blocks of 0.2 s, in which a contact is a diffuse
         nuisance: drift is common to the sensors, a contact is local, and stays however long it
         lasts.  What presses in the first block is taken for the baseline.  A sensor that is dead,
-        has not changed for 1 s, or that alone contradicts all others for most of a second, is left
+        has not changed for 1 s and two frames, or that alone contradicts all others for most of a second, is left
         out (``left_out``); one that was stuck returns when it changes.  Contacts are assumed to be
         without shear: one of Q over P moves the place by about 0.35 h Q/P, h being the film's
         thickness.

@@ -60,9 +60,10 @@ from memscal.model.arrays import (
 from memscal.model.checks import FALSE_ALARM
 
 #: Duration of a block of the filter, in s.  A sensor is stuck if it is unchanged for longer than
-#: the other time, from the beginning of the block of its last change.
+#: the other time, and so many blocks, from the beginning of the block of its last change.
 _BLOCK = 0.2
 _PATIENCE = 1.1
+_PATIENT_BLOCKS = 2.5
 #: Contacts are sought so many thicknesses beyond the sensors, on a grid of this step; each of three
 #: steps of Gauss-Newton from its best node is at most a step of the grid.
 _MARGIN = 1.0
@@ -154,6 +155,7 @@ class Stream:
         self._array = array
         self._rate = rate
         self._length = max(1, round(_BLOCK * rate))
+        self._patience = max(_PATIENCE, _PATIENT_BLOCKS * self._length / rate)
         self._seeking = Seeking.on(array, indenter, 0.0, _MARGIN)
         self._told = np.array([*self._seeking.axes, 2])
         self._sensors = self._seeking.fields.sensors
@@ -200,7 +202,7 @@ class Stream:
         """Why sensors are left out at present, by their names."""
         sensors = self._array.sensors
         reasons = np.full(len(sensors), "dead in the calibration")
-        stuck = self._now.unchanged > _PATIENCE
+        stuck = self._stuck
         reason = np.where(stuck, "unchanged for 1 s", "contradicts all others")
         reasons[self._sensors] = np.where(self._dropped, reason, "")
         return {
@@ -262,8 +264,14 @@ class Stream:
     @property
     def _dropped(self) -> BoolArray:
         """Which of the used sensors are left out."""
-        dropped: BoolArray = (self._now.unchanged > _PATIENCE) | (self._now.doubt >= _DROPPED)
+        dropped: BoolArray = self._stuck | (self._now.doubt >= _DROPPED)
         return dropped
+
+    @property
+    def _stuck(self) -> BoolArray:
+        """Which of the used sensors have not changed for too long."""
+        stuck: BoolArray = self._now.unchanged > self._patience
+        return stuck
 
     def _take(self, given: FloatArray, records: NDArray[Any]) -> None:
         """Fill the records of frames within one block of the filter."""

@@ -88,6 +88,16 @@ def test_a_stuck_sensor_is_left_out_and_returns_when_it_changes(seed):
         assert abs(late["force"].mean() - 1) < 4 * np.sqrt(late["covariance"][0, 2, 2])
 
 
+def test_at_a_low_rate_a_stuck_sensor_alone_is_left_out(seed):
+    stream = ARRAY.stream(0.5)
+    readings = frames(seed, 0.4, 1.0)
+    stream.push(readings)
+    assert stream.left_out == {}
+    readings[:, 4] = 1.0
+    stream.push(readings)
+    assert stream.left_out == {"T04": "unchanged for 1 s"}
+
+
 def test_a_sensor_whose_reading_jumps_is_left_out(seed):
     stream = resting(seed)
     jumped = frames([seed, 1], 4, 1.0)
