@@ -226,7 +226,7 @@ class SensorArray(ArrayData, Shown, Gridded):
 
         A frame has a contact from six standard deviations on: where weak ones matter, average
         frames before they are pushed.  Readings that are rounded so coarsely that a sound sensor
-        does not change for 1 s are taken for stuck.
+        does not change for 1 s are taken for stuck, if not at an end of its range.
 
         Parameters
         ----------

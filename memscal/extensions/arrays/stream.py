@@ -64,6 +64,8 @@ from memscal.model.checks import FALSE_ALARM
 _BLOCK = 0.2
 _PATIENCE = 1.1
 _PATIENT_BLOCKS = 2.5
+#: A sensor counts in a block if it reads in this share of the frames that any sensor reads in.
+_FRAMES = 0.9
 #: Contacts are sought so many thicknesses beyond the sensors, on a grid of this step; each of three
 #: steps of Gauss-Newton from its best node is at most a step of the grid.
 _MARGIN = 1.0
@@ -280,7 +282,8 @@ class Stream:
         readings = given[:, self._sensors]
         missing = ~np.isfinite(readings)
         valid = ~(missing | saturated)
-        changed = (readings != np.vstack([now.last, readings[:-1]])).any(axis=0)
+        # At an end of its range a sound sensor does not change, and keeps its baseline.
+        changed = (saturated | (readings != np.vstack([now.last, readings[:-1]]))).any(axis=0)
         now.unchanged[changed] = 0.0
         now.last[:] = readings[-1]
         now.sums += np.where(valid, readings, 0.0).sum(axis=0)
@@ -403,7 +406,9 @@ class Stream:
         now.unchanged += self._length / self._rate
         dropped = self._dropped
         now.baselines[:, dropped] = np.nan
-        seen = ~dropped & (now.counts >= self._length / 2)
+        # A mean over other frames than those of the others would be of another force.
+        least = max(_FRAMES * now.counts.max(), self._length / 2)
+        seen = ~dropped & (now.counts >= least)
         begin = seen & np.isnan(now.baselines[0])
         now.baselines[:, begin] = mean[begin]
         now.covariance += self._walk

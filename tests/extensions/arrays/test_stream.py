@@ -122,6 +122,32 @@ def test_missing_saturated_and_dead_sensors_move_nothing_else(seed):
     assert found["flags"][7] & FrameFlag.NO_READING
 
 
+def test_a_sensor_at_its_end_is_not_stuck_and_keeps_its_baseline(seed):
+    highest = 1 + 0.8 * TOUCH.max()
+    stream = resting(seed, limit=(0.0, highest))
+    during = stream.push(np.minimum(frames([seed, 1], 4, 1 + TOUCH), highest))
+    assert np.all(during["flags"] == FrameFlag.SATURATED)
+    assert stream.left_out == {}
+    after = stream.push(frames([seed, 2], 4, 1.0))
+    assert np.all(after["flags"] == 0)
+    assert not after["contact"].any()
+
+
+def test_a_sensor_that_returns_while_a_contact_leaves_has_the_right_baseline(seed):
+    stream = resting(seed)
+    # It has no baseline after this.
+    readings = frames([seed, 1], 2, 1.0)
+    readings[:, 4] = 1.0
+    stream.push(readings)
+    # A block is 10 frames.
+    readings = frames([seed, 2], 4, 1.0)
+    readings[:55] += TOUCH
+    readings[:55, 4] = np.nan
+    stream.push(readings)
+    assert stream.left_out == {}
+    assert not stream.push(frames([seed, 3], 1, 1.0))["contact"].any()
+
+
 def test_before_a_baseline_is_known_no_sensor_is_said_to_be_left_out(seed):
     stream = ARRAY.stream(RATE)
     first, second = np.split(stream.push(frames(seed, 0.4)), 2)
