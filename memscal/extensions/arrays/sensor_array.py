@@ -216,10 +216,10 @@ class SensorArray(ArrayData, Shown, Gridded):
         Baselines are tracked by a Kalman filter in blocks of 0.2 s, in which a contact is a diffuse
         nuisance: drift is common to the sensors, a contact is local, and stays however long it
         lasts.  What presses in the first block is taken for the baseline.  A sensor that is dead,
-        has not changed for 1 s and two frames, or that alone contradicts all others for most of a second, is left
-        out (``left_out``); one that was stuck returns when it changes.  Contacts are assumed to be
-        without shear: one of Q over P moves the place by about 0.35 h Q/P, h being the film's
-        thickness.
+        has not changed for 1 s and two frames, or that alone contradicts all others for most of a
+        second, is left out (``left_out``); one that was stuck returns when it changes.  Contacts
+        are assumed to be without shear: one of Q over P moves the place by about 0.35 h Q/P, h
+        being the film's thickness.
 
         A frame is judged by the baselines at the end of the last block.  However a stream is cut
         into what is pushed, its records are the same but for rounding.

@@ -27,6 +27,7 @@ them at once, and the one under which the readings are most probable holds.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from copy import deepcopy
 from dataclasses import replace
 from enum import IntFlag
@@ -149,10 +150,8 @@ class Stream:
         indenter: Touch,
     ) -> None:
         require_positive("rate", rate, "Hz")
-        if limit:
-            low, high = map(floats, limit)
-            if not np.all(low < high):
-                raise InputError(f"The limits are {low} and {high}; the lower one is needed first.")
+        if limit is not None:
+            low, high = _limits(limit, len(array.sensors))
             array = replace(array, reading_low=low, reading_high=high)
         self._array = array
         self._rate = rate
@@ -175,13 +174,16 @@ class Stream:
         self._unknown = (_UNKNOWN * peak) ** 2
         walks = peak * np.multiply.outer([_COMMON, 1.0], _STRENGTHS)
         if drift is not None:
-            require_non_negative("The least drift", np.min(drift))
-            walks = floats(drift)[:, None]
+            walks = _drift(drift)[:, None]
         common, own = walks[..., None, None] ** 2 * self._length / rate
         n = self._sensors.size
         self._walk = common + own * np.eye(n)
+        fields = self._grid.sum(), self._noise.sum()
+        ends = np.full((2, len(array.sensors)), [[-np.inf], [np.inf]])
+        for end, stated in zip(ends, (array.reading_low, array.reading_high), strict=True):
+            end[:] = end if stated is None else stated
         self._now = SimpleNamespace(
-            made=np.array([rate, self._grid.sum(), self._noise.sum(), walks.sum()]),
+            made=np.array([rate, *fields, *walks.sum(axis=1), *ends.ravel()]),
             frames=np.array(0),
             last=np.zeros(n),
             # Of the current block.
@@ -256,9 +258,13 @@ class Stream:
             If the state is not of such a stream.
         """
         now = vars(self._now)
-        fits = all(np.shape(state.get(name, [[]])) == value.shape for name, value in now.items())
-        # What it was made with: rate, fields, noise and drift.
-        if not fits or not np.allclose(state["made"], self._now.made, rtol=1e-6, atol=0.0):
+        given: Any = state
+        given = given if isinstance(given, Mapping) else {}
+        fits = all(np.shape(given.get(name, [[]])) == value.shape for name, value in now.items())
+        # What it was made with: rate, fields, noise, drift and limits.
+        if not fits or not np.allclose(
+            given["made"], self._now.made, rtol=1e-6, atol=0.0, equal_nan=True
+        ):
             raise InputError("The state is not of a stream of this array and these arguments.")
         for name, value in now.items():
             value[...] = state[name]
@@ -469,6 +475,32 @@ class Stream:
         now.sureness += 1 / variance
         now.place += away / (variance * now.sureness)
         return floats(now.place[None].copy())
+
+
+def _limits(limit: tuple[ArrayLike, ArrayLike], count: int) -> ArrayPair:
+    """Return the lowest and the highest readings, each of all sensors."""
+    try:
+        low, high = (np.broadcast_to(floats(end), count) for end in limit)
+    except (TypeError, ValueError):
+        raise InputError(
+            f"The limits are {limit}, but two are needed, each of one or of {count} numbers."
+        ) from None
+    if not np.all(low < high):
+        raise InputError(f"The limits are {low} and {high}; the lower one is needed first.")
+    return low, high
+
+
+def _drift(drift: tuple[float, float]) -> FloatArray:
+    """Return the drift in common and of each sensor, (2,)."""
+    try:
+        walks = floats(drift)
+    except (TypeError, ValueError):
+        walks = np.zeros(0)
+    if walks.shape != (2,):
+        raise InputError(f"The drift is {drift}, but two numbers are needed: common, and own.")
+    for walk in walks:
+        require_non_negative("A drift", walk)
+    return walks
 
 
 def _linear_step(
