@@ -95,6 +95,8 @@ _UNKNOWN = 100.0
 #: newest in it: after most of a second.
 _DROPPED = 0.5
 _NEWEST = 0.2
+#: How many sensors are tried by a fit without each, of those that one fit with all doubts most.
+_SUSPECTS = 6
 
 
 class FrameFlag(IntFlag):
@@ -451,8 +453,8 @@ class Stream:
         if chi2[best] < limit:
             determinants = np.linalg.slogdet(summed)[1] + np.linalg.slogdet(information)[1]
             now.evidence = _KEPT * now.evidence - (chi2 + determinants) / 2
-        elif freedom > 1 and chi2[best] - alone.max() < limit:
-            now.doubt[alone.argmax()] += _NEWEST
+        elif freedom > 1:
+            self._doubt(deviations[[best]], summed[best], alone.argsort()[-_SUSPECTS:], limit)
 
         # What one contact does not explain moves the baselines less.
         share = (limit / np.maximum(chi2, limit))[:, None, None]
@@ -461,6 +463,18 @@ class Stream:
         now.covariance -= gain @ now.covariance
         # By rounding alone it would grow asymmetric, from block to block.
         now.covariance = (now.covariance + now.covariance.swapaxes(1, 2)) / 2
+
+    def _doubt(
+        self, deviations: FloatArray, summed: FloatArray, suspects: IndexArray, limit: float
+    ) -> None:
+        """Doubt the sensor without which one contact, fitted anew, explains the deviations best."""
+        left = np.zeros(suspects.size)
+        for i, suspect in enumerate(suspects):
+            without = summed.copy()
+            without[suspect, suspect] += self._unknown
+            left[i] = self._fit(deviations, floats(np.linalg.inv(without)), _SPARED).chi2[0]
+        if left.min() < limit:
+            self._now.doubt[suspects[left.argmin()]] += _NEWEST
 
     def _stays(self, fit: _Fit) -> FloatArray:
         """Return the mean place of a block's contact and what it was before, (f, 2), f = 0 or 1."""

@@ -108,6 +108,16 @@ def test_a_sensor_whose_reading_jumps_is_left_out(seed):
     assert not found[2 * RATE :]["contact"].any()
 
 
+@pytest.mark.parametrize("sensor", [1, 4, 5])
+def test_a_sensor_that_dies_under_a_contact_is_left_out(seed, sensor):
+    stream = resting(seed)
+    stream.push(frames([seed, 1], 2, 1 + TOUCH))
+    found = stream.push(frames([seed, 2], 4, 1 + np.where(np.arange(9) == sensor, 0.0, TOUCH)))
+    assert stream.left_out == {f"T0{sensor}": "contradicts all others"}
+    late = found[2 * RATE :]
+    assert abs(late["force"].mean() - 1) < 4 * np.sqrt(late["covariance"][0, 2, 2])
+
+
 def test_missing_saturated_and_dead_sensors_move_nothing_else(seed):
     used = np.arange(9) != 6
     stream = resting(seed, replace(ARRAY, used=used), limit=(0.0, 1 + 0.8 * TOUCH.max()))
@@ -126,10 +136,11 @@ def test_a_sensor_at_its_end_is_not_stuck_and_keeps_its_baseline(seed):
     highest = 1 + 0.8 * TOUCH.max()
     stream = resting(seed, limit=(0.0, highest))
     during = stream.push(np.minimum(frames([seed, 1], 4, 1 + TOUCH), highest))
-    assert np.all(during["flags"] == FrameFlag.SATURATED)
+    assert during["flags"][0] & FrameFlag.SATURATED
     assert stream.left_out == {}
     after = stream.push(frames([seed, 2], 4, 1.0))
-    assert np.all(after["flags"] == 0)
+    for found in (during, after):
+        assert not np.any(found["flags"] & FrameFlag.DROPPED)
     assert not after["contact"].any()
 
 
