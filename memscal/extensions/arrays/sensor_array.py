@@ -216,17 +216,17 @@ class SensorArray(ArrayData, Shown, Gridded):
         Baselines are tracked by a Kalman filter in blocks of 0.2 s, in which a contact is a diffuse
         nuisance: drift is common to the sensors, a contact is local, and stays however long it
         lasts.  What presses in the first block is taken for the baseline.  A sensor that is dead,
-        has not changed for 1 s, or that alone contradicts all others for most of a second, is left
-        out (``left_out``); one that was stuck returns when it changes.  Contacts are assumed to be
-        without shear: one of Q over P moves the place by about 0.35 h Q/P, h being the film's
-        thickness.
+        has not changed for 1 s and two frames, or that alone contradicts all others for most of a
+        second, is left out (``left_out``); one that was stuck returns when it changes.  Contacts
+        are assumed to be without shear: one of Q over P moves the place by about 0.35 h Q/P, h
+        being the film's thickness.
 
         A frame is judged by the baselines at the end of the last block.  However a stream is cut
         into what is pushed, its records are the same but for rounding.
 
         A frame has a contact from six standard deviations on: where weak ones matter, average
         frames before they are pushed.  Readings that are rounded so coarsely that a sound sensor
-        does not change for 1 s are taken for stuck.
+        does not change for 1 s are taken for stuck, if not at an end of its range.
 
         Parameters
         ----------

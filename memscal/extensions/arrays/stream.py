@@ -10,12 +10,15 @@ per newton of a contact at r:
     z(r) = \frac{H^T S^{-1} e}{\sqrt{H^T S^{-1} H}}
 
 A frame has a contact if z exceeds 6 at a node of a grid of places; that of a block is kept out of
-the baselines from 3.5 on.  With J = [H_x, H_y, H] at its place, and M = S^-1 without a contact,
+the baselines from 3.5 on.  With J = [H_x, H_y, H] where it stays, and M = S^-1 without a contact,
 
 .. math::
 
     M = S^{-1} - S^{-1} J (J^T S^{-1} J)^{-1} J^T S^{-1}, \quad
     b \leftarrow b + P M e, \quad P \leftarrow P - P M P .
+
+The place of J is a mean over all blocks in which a contact stays.  At that of each block by itself,
+with its noise, the filter would believe to see more and more of what the contact hides.
 
 Drift is common to all sensors and a contact is local: that separates them, and not a constant of
 time.  The random walks have :math:`Q = q_c 1 1^T + q I`; the filter runs at several strengths of
@@ -24,6 +27,7 @@ them at once, and the one under which the readings are most probable holds.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from copy import deepcopy
 from dataclasses import replace
 from enum import IntFlag
@@ -57,9 +61,12 @@ from memscal.model.arrays import (
 from memscal.model.checks import FALSE_ALARM
 
 #: Duration of a block of the filter, in s.  A sensor is stuck if it is unchanged for longer than
-#: the other time, from the beginning of the block of its last change.
+#: the other time, and so many blocks, from the beginning of the block of its last change.
 _BLOCK = 0.2
 _PATIENCE = 1.1
+_PATIENT_BLOCKS = 2.5
+#: A sensor counts in a block if it reads in this share of the frames that any sensor reads in.
+_FRAMES = 0.9
 #: Contacts are sought so many thicknesses beyond the sensors, on a grid of this step; each of three
 #: steps of Gauss-Newton from its best node is at most a step of the grid.
 _MARGIN = 1.0
@@ -72,6 +79,8 @@ _DIGITS = 2.0 ** np.array([0, 20, 40])
 #: which that of a block is kept out of the baselines: long before it is seen in a frame.
 _FOUND = 6.0
 _SPARED = 3.5
+#: A contact has moved if its place differs from the mean by so many standard uncertainties.
+_MOVED = 4.0
 #: Random walks of single sensors in 1 s, over the array's largest reading; the common one over it.
 #: The first holds until the readings tell.
 _STRENGTHS = np.array([0.04, 0.008, 0.2]) / 100
@@ -86,6 +95,8 @@ _UNKNOWN = 100.0
 #: newest in it: after most of a second.
 _DROPPED = 0.5
 _NEWEST = 0.2
+#: How many sensors are tried by a fit without each, of those that one fit with all doubts most.
+_SUSPECTS = 6
 
 
 class FrameFlag(IntFlag):
@@ -141,14 +152,13 @@ class Stream:
         indenter: Touch,
     ) -> None:
         require_positive("rate", rate, "Hz")
-        if limit:
-            low, high = map(floats, limit)
-            if not np.all(low < high):
-                raise InputError(f"The limits are {low} and {high}; the lower one is needed first.")
+        if limit is not None:
+            low, high = _limits(limit, len(array.sensors))
             array = replace(array, reading_low=low, reading_high=high)
         self._array = array
         self._rate = rate
         self._length = max(1, round(_BLOCK * rate))
+        self._patience = max(_PATIENCE, _PATIENT_BLOCKS * self._length / rate)
         self._seeking = Seeking.on(array, indenter, 0.0, _MARGIN)
         self._told = np.array([*self._seeking.axes, 2])
         self._sensors = self._seeking.fields.sensors
@@ -166,13 +176,16 @@ class Stream:
         self._unknown = (_UNKNOWN * peak) ** 2
         walks = peak * np.multiply.outer([_COMMON, 1.0], _STRENGTHS)
         if drift is not None:
-            require_non_negative("The least drift", np.min(drift))
-            walks = floats(drift)[:, None]
+            walks = _drift(drift)[:, None]
         common, own = walks[..., None, None] ** 2 * self._length / rate
         n = self._sensors.size
         self._walk = common + own * np.eye(n)
+        fields = self._grid.sum(), self._noise.sum()
+        ends = np.full((2, len(array.sensors)), [[-np.inf], [np.inf]])
+        for end, stated in zip(ends, (array.reading_low, array.reading_high), strict=True):
+            end[:] = end if stated is None else stated
         self._now = SimpleNamespace(
-            made=np.array([rate, self._grid.sum(), self._noise.sum(), walks.sum()]),
+            made=np.array([rate, *fields, *walks.sum(axis=1), *ends.ravel()]),
             frames=np.array(0),
             last=np.zeros(n),
             # Of the current block.
@@ -181,6 +194,9 @@ class Stream:
             # Seconds, and the share of blocks that a sensor alone contradicts.
             unchanged=np.zeros(n),
             doubt=np.zeros(n),
+            # Mean place of a contact that stays, and 1 over its variance; 0 without one.
+            place=np.zeros(2),
+            sureness=np.array(0.0),
             # By strength of the drift; a baseline that is not known is NaN.
             baselines=np.full((own.size, n), np.nan),
             covariance=np.zeros((own.size, n, n)),
@@ -192,7 +208,7 @@ class Stream:
         """Why sensors are left out at present, by their names."""
         sensors = self._array.sensors
         reasons = np.full(len(sensors), "dead in the calibration")
-        stuck = self._now.unchanged > _PATIENCE
+        stuck = self._stuck
         reason = np.where(stuck, "unchanged for 1 s", "contradicts all others")
         reasons[self._sensors] = np.where(self._dropped, reason, "")
         return {
@@ -244,9 +260,13 @@ class Stream:
             If the state is not of such a stream.
         """
         now = vars(self._now)
-        fits = all(np.shape(state.get(name, [[]])) == value.shape for name, value in now.items())
-        # What it was made with: rate, fields, noise and drift.
-        if not fits or not np.allclose(state["made"], self._now.made, rtol=1e-6, atol=0.0):
+        given: Any = state
+        given = given if isinstance(given, Mapping) else {}
+        fits = all(np.shape(given.get(name, [[]])) == value.shape for name, value in now.items())
+        # What it was made with: rate, fields, noise, drift and limits.
+        if not fits or not np.allclose(
+            given["made"], self._now.made, rtol=1e-6, atol=0.0, equal_nan=True
+        ):
             raise InputError("The state is not of a stream of this array and these arguments.")
         for name, value in now.items():
             value[...] = state[name]
@@ -254,8 +274,14 @@ class Stream:
     @property
     def _dropped(self) -> BoolArray:
         """Which of the used sensors are left out."""
-        dropped: BoolArray = (self._now.unchanged > _PATIENCE) | (self._now.doubt >= _DROPPED)
+        dropped: BoolArray = self._stuck | (self._now.doubt >= _DROPPED)
         return dropped
+
+    @property
+    def _stuck(self) -> BoolArray:
+        """Which of the used sensors have not changed for too long."""
+        stuck: BoolArray = self._now.unchanged > self._patience
+        return stuck
 
     def _take(self, given: FloatArray, records: NDArray[Any]) -> None:
         """Fill the records of frames within one block of the filter."""
@@ -264,7 +290,8 @@ class Stream:
         readings = given[:, self._sensors]
         missing = ~np.isfinite(readings)
         valid = ~(missing | saturated)
-        changed = (readings != np.vstack([now.last, readings[:-1]])).any(axis=0)
+        # At an end of its range a sound sensor does not change, and keeps its baseline.
+        changed = (saturated | (readings != np.vstack([now.last, readings[:-1]]))).any(axis=0)
         now.unchanged[changed] = 0.0
         now.last[:] = readings[-1]
         now.sums += np.where(valid, readings, 0.0).sum(axis=0)
@@ -387,7 +414,9 @@ class Stream:
         now.unchanged += self._length / self._rate
         dropped = self._dropped
         now.baselines[:, dropped] = np.nan
-        seen = ~dropped & (now.counts >= self._length / 2)
+        # A mean over other frames than those of the others would be of another force.
+        least = max(_FRAMES * now.counts.max(), self._length / 2)
+        seen = ~dropped & (now.counts >= least)
         begin = seen & np.isnan(now.baselines[0])
         now.baselines[:, begin] = mean[begin]
         now.covariance += self._walk
@@ -406,7 +435,7 @@ class Stream:
         summed = now.covariance + noise + self._unknown * np.diag(~seen)
         fit = self._fit(deviations[[best]], np.linalg.inv(summed[best]), _SPARED)
         # Slopes of a place nearby would let what they miss into the baselines, block by block.
-        jacobian = self._slopes(fit.place, fit.force).reshape(-1, seen.size)
+        jacobian = self._slopes(self._stays(fit), fit.force).reshape(-1, seen.size)
         for node in fit.node:
             summed += fit.force**2 * self._errors_at(node)[0]
         weight = np.linalg.inv(summed)
@@ -424,8 +453,8 @@ class Stream:
         if chi2[best] < limit:
             determinants = np.linalg.slogdet(summed)[1] + np.linalg.slogdet(information)[1]
             now.evidence = _KEPT * now.evidence - (chi2 + determinants) / 2
-        elif freedom > 1 and chi2[best] - alone.max() < limit:
-            now.doubt[alone.argmax()] += _NEWEST
+        elif freedom > 1:
+            self._doubt(deviations[[best]], summed[best], alone.argsort()[-_SUSPECTS:], limit)
 
         # What one contact does not explain moves the baselines less.
         share = (limit / np.maximum(chi2, limit))[:, None, None]
@@ -434,6 +463,58 @@ class Stream:
         now.covariance -= gain @ now.covariance
         # By rounding alone it would grow asymmetric, from block to block.
         now.covariance = (now.covariance + now.covariance.swapaxes(1, 2)) / 2
+
+    def _doubt(
+        self, deviations: FloatArray, summed: FloatArray, suspects: IndexArray, limit: float
+    ) -> None:
+        """Doubt the sensor without which one contact, fitted anew, explains the deviations best."""
+        left = np.zeros(suspects.size)
+        for i, suspect in enumerate(suspects):
+            without = summed.copy()
+            without[suspect, suspect] += self._unknown
+            left[i] = self._fit(deviations, floats(np.linalg.inv(without)), _SPARED).chi2[0]
+        if left.min() < limit:
+            self._now.doubt[suspects[left.argmin()]] += _NEWEST
+
+    def _stays(self, fit: _Fit) -> FloatArray:
+        """Return the mean place of a block's contact and what it was before, (f, 2), f = 0 or 1."""
+        now = self._now
+        if fit.rows.size == 0:
+            now.sureness[...] = 0.0
+            return fit.place
+        variance = np.trace(fit.covariance[0, :-1, :-1]) / fit.force[0] ** 2
+        [away] = fit.place - now.place
+        if away @ away > _MOVED**2 * variance:
+            now.sureness[...] = 0.0
+        now.sureness += 1 / variance
+        now.place += away / (variance * now.sureness)
+        return floats(now.place[None].copy())
+
+
+def _limits(limit: tuple[ArrayLike, ArrayLike], count: int) -> ArrayPair:
+    """Return the lowest and the highest readings, each of all sensors."""
+    try:
+        low, high = (np.broadcast_to(floats(end), count) for end in limit)
+    except (TypeError, ValueError):
+        raise InputError(
+            f"The limits are {limit}, but two are needed, each of one or of {count} numbers."
+        ) from None
+    if not np.all(low < high):
+        raise InputError(f"The limits are {low} and {high}; the lower one is needed first.")
+    return low, high
+
+
+def _drift(drift: tuple[float, float]) -> FloatArray:
+    """Return the drift in common and of each sensor, (2,)."""
+    try:
+        walks = floats(drift)
+    except (TypeError, ValueError):
+        walks = np.zeros(0)
+    if walks.shape != (2,):
+        raise InputError(f"The drift is {drift}, but two numbers are needed: common, and own.")
+    for walk in walks:
+        require_non_negative("A drift", walk)
+    return walks
 
 
 def _linear_step(

@@ -88,6 +88,16 @@ def test_a_stuck_sensor_is_left_out_and_returns_when_it_changes(seed):
         assert abs(late["force"].mean() - 1) < 4 * np.sqrt(late["covariance"][0, 2, 2])
 
 
+def test_at_a_low_rate_a_stuck_sensor_alone_is_left_out(seed):
+    stream = ARRAY.stream(0.5)
+    readings = frames(seed, 0.4, 1.0)
+    stream.push(readings)
+    assert stream.left_out == {}
+    readings[:, 4] = 1.0
+    stream.push(readings)
+    assert stream.left_out == {"T04": "unchanged for 1 s"}
+
+
 def test_a_sensor_whose_reading_jumps_is_left_out(seed):
     stream = resting(seed)
     jumped = frames([seed, 1], 4, 1.0)
@@ -96,6 +106,16 @@ def test_a_sensor_whose_reading_jumps_is_left_out(seed):
     found = stream.push(jumped)
     assert stream.left_out == {"T04": "contradicts all others"}
     assert not found[2 * RATE :]["contact"].any()
+
+
+@pytest.mark.parametrize("sensor", [1, 4, 5])
+def test_a_sensor_that_dies_under_a_contact_is_left_out(seed, sensor):
+    stream = resting(seed)
+    stream.push(frames([seed, 1], 2, 1 + TOUCH))
+    found = stream.push(frames([seed, 2], 4, 1 + np.where(np.arange(9) == sensor, 0.0, TOUCH)))
+    assert stream.left_out == {f"T0{sensor}": "contradicts all others"}
+    late = found[2 * RATE :]
+    assert abs(late["force"].mean() - 1) < 4 * np.sqrt(late["covariance"][0, 2, 2])
 
 
 def test_missing_saturated_and_dead_sensors_move_nothing_else(seed):
@@ -110,6 +130,33 @@ def test_missing_saturated_and_dead_sensors_move_nothing_else(seed):
     assert np.flatnonzero(found["flags"] & FrameFlag.MISSING).tolist() == [5, 7]
     assert np.flatnonzero(np.isnan(found["force"])).tolist() == [7]
     assert found["flags"][7] & FrameFlag.NO_READING
+
+
+def test_a_sensor_at_its_end_is_not_stuck_and_keeps_its_baseline(seed):
+    highest = 1 + 0.8 * TOUCH.max()
+    stream = resting(seed, limit=(0.0, highest))
+    during = stream.push(np.minimum(frames([seed, 1], 4, 1 + TOUCH), highest))
+    assert during["flags"][0] & FrameFlag.SATURATED
+    assert stream.left_out == {}
+    after = stream.push(frames([seed, 2], 4, 1.0))
+    for found in (during, after):
+        assert not np.any(found["flags"] & FrameFlag.DROPPED)
+    assert not after["contact"].any()
+
+
+def test_a_sensor_that_returns_while_a_contact_leaves_has_the_right_baseline(seed):
+    stream = resting(seed)
+    # It has no baseline after this.
+    readings = frames([seed, 1], 2, 1.0)
+    readings[:, 4] = 1.0
+    stream.push(readings)
+    # A block is 10 frames.
+    readings = frames([seed, 2], 4, 1.0)
+    readings[:55] += TOUCH
+    readings[:55, 4] = np.nan
+    stream.push(readings)
+    assert stream.left_out == {}
+    assert not stream.push(frames([seed, 3], 1, 1.0))["contact"].any()
 
 
 def test_before_a_baseline_is_known_no_sensor_is_said_to_be_left_out(seed):
@@ -150,8 +197,20 @@ def test_two_contacts_and_one_outside_are_flagged(seed):
         (lambda: ARRAY.stream(RATE, indenter="pen"), "indenter is 'pen'"),
         (lambda: ARRAY.stream(2 * RATE).restore(ARRAY.stream(RATE).state()), "not of a stream"),
         (lambda: ARRAY.stream(RATE).restore(WIDER.stream(RATE).state()), "not of a stream"),
-        (lambda: ARRAY.stream(RATE, limit=(1.0, 0.0)), "limits are 1.0 and 0.0"),
-        (lambda: ARRAY.stream(RATE, limit=(np.nan, 1.0)), "limits are nan"),
+        (lambda: ARRAY.stream(RATE).restore(None), "state is not of a stream"),
+        (
+            lambda: ARRAY.stream(RATE, limit=(0, 1)).restore(ARRAY.stream(RATE).state()),
+            "state is not of a stream",
+        ),
+        (lambda: ARRAY.stream(RATE, limit=(1.0, 0.0)), "lower one is needed first"),
+        (lambda: ARRAY.stream(RATE, limit=(np.nan, 1.0)), "lower one is needed first"),
+        (lambda: ARRAY.stream(RATE, limit=5), "limits are 5, but two are needed"),
+        (lambda: ARRAY.stream(RATE, limit=()), "two are needed"),
+        (lambda: ARRAY.stream(RATE, limit=(0,)), "two are needed"),
+        (lambda: ARRAY.stream(RATE, limit=(0.0, np.ones(8))), "of one or of 9 numbers"),
+        (lambda: ARRAY.stream(RATE, drift=5.0), "drift is 5.0, but two numbers are needed"),
+        (lambda: ARRAY.stream(RATE, drift=(1e-4,)), "two numbers are needed"),
+        (lambda: ARRAY.stream(RATE, drift=(1e-4, np.inf)), "drift is inf"),
         (lambda: ARRAY.stream(RATE, drift=(1e-4, -1e-4)), "drift is -0.0001"),
         (lambda: known_array(1, 2).stream(RATE), "2 sensors of the array work"),
         (lambda: replace(FEWER, used=np.arange(4) > 0).stream(RATE), "3 sensors of the array work"),
