@@ -5,6 +5,7 @@ import json
 from dataclasses import replace
 
 import numpy as np
+import openpyxl
 import pytest
 from helpers.arrays import FILM, ROD, known_array
 from helpers.bounds import root_mean_square
@@ -411,7 +412,6 @@ def test_empty_frames_are_kept_wherever_they_stand(tmp_path, delimiter, word, em
 
 
 def test_empty_rows_of_a_workbook_are_frames(tmp_path):
-    openpyxl = pytest.importorskip("openpyxl")
     book = openpyxl.Workbook()
     for row in ([f"{name} [mV]" for name in ROW.sensors], [], [1.5] * 6, [], [2.5] * 6):
         book.active.append(row)
