@@ -340,7 +340,11 @@ def array_messages(
         names = ", ".join(np.array(scan.sensors)[found.dead])
         # Of a sensor at an unknown place no crosstalk is fitted.
         lost = found.dead & ~fit.model.layout.near.any(axis=0)
-        unread = " What others read of them is not fitted: state a layout." if lost.any() else ""
+        unread = (
+            " What others read of them is not fitted: state a layout (--layout)."
+            if lost.any()
+            else ""
+        )
         yield Message("dead_taxels", f"Dead and left out: {names}.{unread}", "warning")
     uncounted = [name for name in _UNCOUNTED if getattr(scan, name) is not None]
     if uncounted:
