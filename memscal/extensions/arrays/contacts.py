@@ -35,8 +35,9 @@ class Contacts(FrozenArrays, Told):
         are left out), ``edge`` (more than half a film's thickness outside the sensors, or such a
         place, where small changes of readings are large forces, is not excluded), ``strong``
         (beyond the forces for which fields are calculated, 16 times that of the scan, or fewer
-        where the film ends or is not linear: their field per newton holds), ``misfit`` (a p-value
-        below 0.001).
+        where the film ends or is not linear: their field per newton holds), ``ambiguous`` (a place
+        more than half a thickness away, or two steps of the raster of measured fields, explains
+        the readings nearly as well), ``misfit`` (a p-value below 0.001).
     assumed_shear : float
         Standard deviation of each component of shear over normal force, before the readings.
     indenter : Rod, Sphere or None

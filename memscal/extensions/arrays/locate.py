@@ -160,8 +160,11 @@ class Seeking:
             score[apart < self.thickness] = -np.inf
         return seen, states, np.sum(u[seen] ** 2, axis=1) - outside**2
 
-    def fitted(self, u: FloatArray, starts: FloatArray) -> FloatArray:
-        """Return the state of least chi-square of frames (m, s), by damped Gauss-Newton steps."""
+    def fitted(self, u: FloatArray, starts: FloatArray) -> tuple[FloatArray, BoolArray]:
+        """Return the states of least chi-square of frames (m, s), by damped Gauss-Newton steps.
+
+        And whether a state elsewhere is not excluded, worse by less than what a contact is seen by.
+        """
         u = np.repeat(u, _STARTS, axis=0)
         state = starts.reshape(-1, 5)
         damping = np.full(len(state), _DAMPING)
@@ -175,8 +178,12 @@ class Seeking:
             state[better] = trial[better]
             residual[better] = there[better]
             slopes[better] = bent[better]
-        best = np.sum(residual**2, axis=1).reshape(-1, _STARTS).argmin(axis=1)
-        return floats(state.reshape(-1, _STARTS, 5)[np.arange(best.size), best])
+        square = np.sum(residual**2, axis=1).reshape(-1, _STARTS)
+        states = state.reshape(-1, _STARTS, 5)
+        best = states[np.arange(len(states)), square.argmin(axis=1)]
+        apart = np.linalg.norm((states - best[:, None])[..., :2], axis=-1)
+        close = square < square.min(axis=1, keepdims=True) + DETECTED**2
+        return best, np.any(close & (apart > self.near), axis=1)
 
     def judged(self, u: FloatArray, state: FloatArray) -> ArrayTriple:
         """Return states, covariances (m, 3, 3) and chi-squares by noise and the array's errors."""
@@ -283,8 +290,7 @@ def locate(
     state = np.full((len(values), 5), np.nan)
     covariance = np.full((len(values), 3, 3), np.nan)
     p_value = np.full(len(values), np.nan)
-    outside = np.zeros(len(values), bool)
-    sought = np.zeros(len(values), bool)
+    outside, ambiguous, sought = np.zeros((3, len(values)), bool)
     grid = seeking.grid()
     on_grid = fields.value(grid)
     for kept, frames in patterns(np.isfinite(values)):
@@ -298,7 +304,7 @@ def locate(
             u = np.nan_to_num(values[frames[part]]) @ whitener.T
             seen, starts, elsewhere = some.starts(u, grid, on_grid)
             of = frames[part][seen]
-            best = some.fitted(u[seen], starts)
+            best, ambiguous[of] = some.fitted(u[seen], starts)
             state[of], covariance[of], square = some.judged(u[seen], best)
             # Not excluded is what is worse by less than what a contact is seen by.
             outside[of] = elsewhere < square + DETECTED**2
@@ -313,6 +319,7 @@ def locate(
         "saturated": saturated[:, fields.sensors].any(axis=1),
         "edge": outside | (seeking.outside(places) > seeking.near),
         "strong": force > fields.most,
+        "ambiguous": ambiguous,
         "misfit": p_value < FALSE_ALARM,
     }
     rows = np.transpose([*said.values()])

@@ -273,6 +273,20 @@ def test_what_is_unflagged_outside_of_the_sensors_holds(seed):
     assert sum(flag == "" for flag in np.array(found.flags)[bad]) <= 0.02 * 300
 
 
+def test_a_place_beside_the_only_sensors_that_read_is_ambiguous(seed):
+    """Sensors in one line do not tell the side; with the others they do."""
+    places, forces = drawn(GRID, np.random.default_rng(seed))
+    places[:, 1] = GRID.places[4, 1] + np.copysign(1.2e-3, places[:, 1])
+    u = GRID.predict(places, forces)
+    assert set(GRID.locate(u).flags) == {""}
+    u[:, abs(GRID.places[:, 1] - GRID.places[4, 1]) > 0.1e-3] = np.nan
+    found = GRID.locate(u)
+    beside = abs(found.y - places[:, 1]) > 1e-3
+    assert np.sum(beside) > 5
+    ambiguous = np.array(["ambiguous" in flag for flag in found.flags])
+    assert np.mean(ambiguous[beside]) >= 0.9
+
+
 def test_a_pull_is_no_sound_press(seed):
     places, forces = drawn(GRID, np.random.default_rng(seed))
     found = GRID.locate(TRUE_GRID.readings(places, -forces))

@@ -55,6 +55,18 @@ def test_fields_that_change_sign_place_presses_of_other_sizes(array, rng):
     assert "presses like those of the scan" in found.answer()
 
 
+def test_a_place_that_fields_do_not_tell_from_another_is_ambiguous(array, rng):
+    """Without the sensors above and below the line y = 0 its two sides are alike."""
+    places = rng.uniform(3e-3, 8e-3, (50, 2))
+    u = fields(places)
+    assert set(array.locate(u).flags) == {""}
+    u[:, 3:] = np.nan
+    found = array.locate(u)
+    beside = abs(found.y - places[:, 1]) > 3e-3
+    ambiguous = np.array(["ambiguous" in flag for flag in found.flags])
+    assert np.mean(ambiguous[beside]) >= 0.9
+
+
 def test_the_map_of_the_bound_shows_the_sensors(array):
     """It showed corners of the raster."""
     drawn = array.plot().axes[0].lines[0].get_xydata()
