@@ -306,7 +306,8 @@ def _common_mode(fit: JointFit) -> Failing:
     """Test whether pairs of sensors have more, or less, noise in common than a board has."""
     keep = fit.model.presses.keep.astype(float)
     count = np.maximum(keep @ keep.T, 1)
-    expected = fit.noise.covariance + fit.noise.of_presses
+    errors = fit.model.press_errors(fit.state)
+    expected = fit.noise.covariance + np.sum(errors @ errors.mT, axis=0) / count
     scale = np.sqrt(np.diag(expected))
     apart = fit.residual @ fit.residual.T / count - expected
     z = abs(apart / np.outer(scale, scale)) * np.sqrt(count)
@@ -336,13 +337,15 @@ def array_messages(
 ) -> Iterator[Message]:
     """Yield what a user has to know beside the checks."""
     yield from override_messages(prepared.overridden)
+    numbers = fit.model.layout.crosstalk
+    places = numbers[numbers >= 0]
     if found.dead.any():
         names = ", ".join(np.array(scan.sensors)[found.dead])
         # Of a sensor at an unknown place no crosstalk is fitted.
         lost = found.dead & ~fit.model.layout.near.any(axis=0)
         unread = (
             " What others read of them is not fitted: state a layout (--layout)."
-            if lost.any()
+            if lost.any() and places.size
             else ""
         )
         yield Message("dead_taxels", f"Dead and left out: {names}.{unread}", "warning")
@@ -350,8 +353,6 @@ def array_messages(
     if uncounted:
         text = f"Stated, but not counted of an array: {', '.join(uncounted)}."
         yield Message("not_counted", text, "warning")
-    numbers = fit.model.layout.crosstalk
-    places = numbers[numbers >= 0]
     if places.size and not failing.get("crosstalk_identified"):
         values = fit.state.crosstalk[numbers >= 0]
         # Alike for all pairs it is seen by its mean; of a single pair by the whole.

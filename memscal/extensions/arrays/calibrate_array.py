@@ -366,8 +366,7 @@ def _begun(
         np.zeros((n, 0)),
     )
     deviation = np.where(used, _AT_FIRST * found.peak, 1.0)
-    nothing = np.zeros((n, n))
-    return model, state, Noise(deviation**2, nothing, nothing)
+    return model, state, Noise(deviation**2, np.zeros((n, n)))
 
 
 def _guess_dead(centres: FloatArray, axes: tuple[int, ...], used: BoolArray) -> None:

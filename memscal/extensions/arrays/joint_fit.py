@@ -136,9 +136,7 @@ def noise_of(model: JointModel, state: ArrayState) -> Noise:
     presses = model.presses
     residual = model.residual(state)
     errors = model.press_errors(state)
-    both = np.maximum(presses.keep.astype(float) @ presses.keep.T, 1)
-    count = np.diag(both)
-    of_presses = np.sum(errors @ errors.mT, axis=0) / both
+    count = np.maximum(presses.keep.sum(axis=1), 1)
     freedom = np.maximum(1 - model.layout.count / presses.used.sum() / count, 0.1)
     smallest = (_ROUNDING * np.ptp(presses.u, axis=1)) ** 2
     # Presses whose stated errors are small to a sensor, as it is far from them, tell its noise.
@@ -163,7 +161,7 @@ def noise_of(model: JointModel, state: ArrayState) -> Noise:
         total = np.maximum(total, stated)
     least = np.maximum(_LEAST_OWN * total, smallest)
     least[~presses.used] = 1.0
-    return Noise(np.maximum(total - np.diag(common), least), common, of_presses)
+    return Noise(np.maximum(total - np.diag(common), least), common)
 
 
 def fit_array(model: JointModel, state: ArrayState, noise: Noise) -> JointFit:

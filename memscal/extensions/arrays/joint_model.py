@@ -45,7 +45,6 @@ class Noise:
 
     own: FloatArray  # (m,): variance, in V^2
     common: FloatArray  # (m, m): covariance of sensors of one board, in V^2
-    of_presses: FloatArray  # (m, m): mean one by stated errors of place and load, in V^2
 
     @property
     def covariance(self) -> FloatArray:

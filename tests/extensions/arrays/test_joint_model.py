@@ -57,7 +57,7 @@ def test_information_is_that_of_brute_force(axes):
     presses = joint.presses
     shared = np.zeros((M, M))
     shared[:2, :2] = 1e-8
-    noise = Noise(np.array([1e-8, 2e-8, 3e-8, 1.0]), shared, np.zeros((M, M)))
+    noise = Noise(np.array([1e-8, 2e-8, 3e-8, 1.0]), shared)
     data = RNG.normal(size=presses.u.shape) * presses.keep
     found = joint.information(state, noise, data)
     columns = [data]
