@@ -105,7 +105,7 @@ def placed(where: str) -> Iterator[None]:
 
 def require_names(problem: str, given: Iterable[str], known: Collection[str]) -> None:
     """Refuse names that are not known, in the words of the problem, and name the nearest one."""
-    unknown = sorted(name for name in given if name not in known)
+    unknown = sorted(str(name) for name in given if name not in known)
     if unknown:
         near = get_close_matches(unknown[0], known, 1)
         meant = f"Did you mean {near[0]}? " if near else ""

@@ -9,7 +9,7 @@ from typing import Any, TypeVar, dataclass_transform
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from memscal.errors import InputError, UnitWarning
+from memscal.errors import InputError, UnitWarning, placed
 
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.intp]
@@ -77,8 +77,17 @@ def floats(values: ArrayLike) -> FloatArray:
     return np.asarray(values, dtype=np.float64)
 
 
+def require_number(name: str, value: Any) -> None:
+    """Refuse a value that is not one number."""
+    try:
+        math.isnan(value)
+    except TypeError:
+        raise InputError(f"{name} is {value!r}, but one number is needed.") from None
+
+
 def require_positive(name: str, value: float, unit: str = "") -> None:
     """Refuse a value that is not a finite number above zero, or no quantity at all."""
+    require_number(name, value)
     if not 0 < value < math.inf:
         problem = f"{name} is {value:g} {unit}".rstrip() + ", but it must be finite and above zero."
         raise InputError(problem, cure="Check the value and its unit.")
@@ -120,7 +129,10 @@ def require_size(
 
 def require_non_negative(name: str, value: float | None) -> None:
     """Refuse a value that is stated, and is not a finite number of at least zero."""
-    if value is not None and not 0 <= value < math.inf:
+    if value is None:
+        return
+    require_number(name, value)
+    if not 0 <= value < math.inf:
         raise InputError(f"{name} is {value:g}, but it must be finite and not negative.")
 
 
@@ -147,7 +159,10 @@ def slices(count: int, most: int) -> list[slice]:
 
 def frozen_array(values: ArrayLike, *, dtype: Any = np.float64) -> NDArray[Any]:
     """Return a read-only copy, so that a frozen dataclass stays frozen; NaN where it is masked."""
-    array = np.array(unmasked(values), dtype=dtype)
+    try:
+        array = np.array(unmasked(values), dtype=dtype)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"An array of numbers is needed: {error}.") from error
     array.setflags(write=False)
     return array
 
@@ -160,12 +175,14 @@ class FrozenArrays:
         for item in fields(self):
             value = getattr(self, item.name)
             if isinstance(value, np.ndarray | list):
-                object.__setattr__(self, item.name, frozen_array(value))
+                with placed(item.name):
+                    object.__setattr__(self, item.name, frozen_array(value))
 
 
 def finite_vector(name: str, values: ArrayLike) -> FloatArray:
     """Return a read-only 1-D copy; refuse another shape or a value that is not finite."""
-    array = frozen_array(values)
+    with placed(name):
+        array = frozen_array(values)
     if array.ndim != 1 or array.size == 0:
         raise InputError(f"{name} has shape {array.shape}, but a 1-D array with values is needed.")
     if not np.all(np.isfinite(array)):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import field, fields, replace
 from functools import partial
 from types import MappingProxyType
@@ -12,7 +12,7 @@ from typing import Any, Literal, NamedTuple, TypedDict, Unpack
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from memscal.errors import InputError
+from memscal.errors import InputError, placed
 from memscal.extensions import hook
 from memscal.model.arrays import (
     BoolArray,
@@ -78,11 +78,22 @@ _BY_ROW = ("branch", "sliding_direction")
 LINE = 0.01
 
 
+#: What is possible of what an array states, if not any finite number; what is that of the scan of
+#: each sensor is proved with it.
+_POSSIBLE: dict[str, Callable[[FloatArray], BoolArray]] = {
+    "u_zz_errors": np.isreal,
+    "used": lambda values: np.isin(values, (0, 1)),
+    "layout_uncertainty": lambda values: (values >= 0) & np.isfinite(values),
+    "reading_low": lambda values: ~np.isnan(values),
+    "reading_high": lambda values: ~np.isnan(values),
+}
+
+
 def require_rod_friction(friction: float | None) -> None:
     """Refuse a friction of the rod that no film of rubber is solved with."""
     if friction not in (None, 0.0, math.inf):
         raise InputError(
-            f"The rod's friction is {friction:g}.",
+            f"The rod's friction is {friction!r}.",
             why="Only a rod that slides freely or sticks is solved at finite strain.",
             cure="Give 0 or inf, or leave it out: the difference is then counted.",
         )
@@ -435,7 +446,8 @@ class Scan:
             self._freeze_array()
             return
         self._freeze_positions()
-        object.__setattr__(self, "u_zz", frozen_array(self.u_zz))
+        with placed("u_zz of the scan"):
+            object.__setattr__(self, "u_zz", frozen_array(self.u_zz))
         self._check_signal_shape()
         self._freeze_readings()
         self._check_values()
@@ -602,7 +614,8 @@ class Scan:
         """Freeze what an array states of its sensors, and prove the scan of each by itself."""
         names = tuple(map(str, self.sensors))
         number = len(names)
-        u_zz = frozen_array(self.u_zz)
+        with placed("u_zz of the scan"):
+            u_zz = frozen_array(self.u_zz)
         if len({*names, ""}) <= number or u_zz.shape[:1] != (number,) or self.channels:
             raise InputError(
                 f"The scan names these sensors: {', '.join(names) or 'none'}; u_zz has shape "
@@ -613,6 +626,12 @@ class Scan:
                 "none empty, and further channels as sensors of their own; or leave layout "
                 "(--layout), board and range out.",
             )
+        if self.motion == "rest":
+            raise InputError(
+                f"The record at rest is of {number} sensors.",
+                why="Noise of an array is found in its scan, and a dwell is that of one sensor.",
+                cure="Give the readings of one sensor (--u COLUMN).",
+            )
         own: Values = {"sensors": names, "sensor": self.sensor, "u_zz": u_zz}
         shapes: Values = {"u_zz_errors": u_zz.shape, **dict.fromkeys(OF_SENSORS, (number,))}
         shapes |= {"layout": (number, 2), "layout_uncertainty": (number, 2)}
@@ -620,17 +639,32 @@ class Scan:
             own[name] = getattr(self, name)
             if own[name] is None:
                 continue
-            values = frozen_array(own[name], dtype=bool if name == "used" else float)
-            whole = values.shape == shape and np.isfinite(values).all()
-            if values.shape != shape[: values.ndim] or (name == "layout" and not whole):
+            with placed(f"{name} of the scan"):
+                values = frozen_array(own[name])
+            possible = _POSSIBLE.get(name, np.isfinite)(values)
+            fewest = len(shape) if name == "layout" else 0
+            fits = values.ndim >= fewest and values.shape == shape[: values.ndim]
+            if not fits or not possible.all():
                 raise InputError(
-                    f"{name} of the scan has shape {values.shape} and "
-                    f"{np.isfinite(values).sum()} finite values, but it should be {shape}.",
-                    why=f"There are {number} sensors.",
-                    cure="Give finite values of that shape, or leave it out.",
+                    f"{name} of the scan has shape {values.shape} and {possible.sum()} possible "
+                    f"values, but it should be {shape}.",
+                    why=f"There are {number} sensors. used is 0 or 1, an uncertainty finite and "
+                    "not negative; an end of a range may be infinite, all else is finite.",
+                    cure="Give such values of that shape, or leave it out.",
                 )
+            require_size(f"{name} of the scan", values[np.isfinite(values)], smallest=0.0)
             # By its first axes, not by its last ones: one value for each sensor, or for all.
             own[name] = np.broadcast_to(values.T, shape[::-1]).T
+            if name == "used":
+                own[name] = own[name] > 0
+        low = own["reading_low"]
+        high = own["reading_high"]
+        if low is not None and high is not None and np.any(low >= high):
+            raise InputError(
+                "reading_low of the scan is not below reading_high.",
+                why="Readings at or beyond them are left out.",
+                cure="Give the lower end of the range of each sensor, and the upper one.",
+            )
         vars(self).update(own)
         first, *_ = [self.of_sensor(i) for i in range(number)]
         vars(self).update(vars(first) | own)

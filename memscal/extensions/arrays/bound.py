@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from memscal.errors import InputError
 from memscal.extensions.arrays.array_data import ArrayData
 from memscal.extensions.arrays.locate import Seeking, Touch, fields_of, steps
-from memscal.model.arrays import FloatArray, finite_vector, floats, require_positive
+from memscal.model.arrays import FloatArray, finite_vector, frozen_array, require_positive
 
 
 def bound(
@@ -21,9 +21,10 @@ def bound(
     shear: float = 0.3,
 ) -> FloatArray:
     """Covariance of x, y and force by the noise, (m, 3, 3): :meth:`SensorArray.bound`."""
-    require_positive("The least force", np.min(force), "N")
+    stated = states(places, force, 0.0)
+    require_positive("The least force", stated[:, 2].min(initial=np.inf), "N")
     seeking = replace(Seeking.on(array, indenter, shear), near=np.inf)
-    residual, slopes = seeking.rows(np.zeros(1), states(places, force, 0.0))
+    residual, slopes = seeking.rows(np.zeros(1), stated)
     _, inverse = steps(residual, slopes)
     return seeking.covariance(inverse)
 
@@ -41,7 +42,7 @@ def predict(
 
 def states(places: ArrayLike, force: ArrayLike, shear: ArrayLike) -> FloatArray:
     """Return contacts as rows of x, y, force, and shear over force along x and y, (m, 5)."""
-    at = np.atleast_2d(floats(places))
+    at = np.atleast_2d(frozen_array(places))
     if at.ndim != 2 or at.shape[1] != 2:
         raise InputError(
             f"The places have shape {np.shape(places)}, but x and y of each are needed, (m, 2).",
@@ -49,8 +50,8 @@ def states(places: ArrayLike, force: ArrayLike, shear: ArrayLike) -> FloatArray:
         )
     count = len(at)
     try:
-        forces = np.broadcast_to(floats(force), count)
-        shears = np.broadcast_to(floats(shear), (count, 2))
+        forces = np.broadcast_to(frozen_array(force), count)
+        shears = np.broadcast_to(frozen_array(shear), (count, 2))
     except ValueError as error:
         raise InputError(
             f"Of {count} places the forces have shape {np.shape(force)}, and the shears "

@@ -181,9 +181,21 @@ def calibrate_array(
     if not found.used.any():
         raise FitError(
             f"None of the {counted(len(opened.sensors), 'sensors')} of the array answers the rod.",
-            cure="Look at the readings; press on the sensors.",
+            why="Each has readings that lie below those far from the rod, at an end of its range, or "
+            "too few near its centre.",
+            cure="If readings fall under the rod, change their sign (--u-sign -1); state the ends of "
+            "the range in their unit (reading_low, reading_high, --ceiling); scan past the sensors "
+            "in steps of an eighth of the film's thickness.",
         )
     prepared = prepare((opened.of_sensor(found.largest),), request)
+    first = prepared.scans[0]
+    if first.film is None or not isinstance(first.indenter, Rod):
+        raise InputError(
+            "The scan of the array has no film and rod, or a source is given in their place.",
+            why="What a contact makes at the base of the film is calculated from them.",
+            cure="State them (memscal import --thickness, --radius), and give no reference, or the "
+            "stress of a rod.",
+        )
     presses = _presses(opened, prepared, found)
     fit = fit_array(*_begun(opened, prepared, found, presses, crosstalk))
     own = kernel == "own" or (kernel == "auto" and opened.planar)
@@ -197,6 +209,7 @@ def calibrate_array(
             "kernel": kernel,
             "crosstalk": crosstalk if isinstance(crosstalk, str) else [*map(list, crosstalk)],
             "film_law": film_law,
+            "mooney_rivlin_ratio": mooney_rivlin_ratio,
             "rod_friction": rod_friction,
             "override": prepared.overridden,
         },

@@ -13,7 +13,6 @@ from memscal.cli.options import (
     Quantity,
     indenter_from,
     option,
-    out_option,
     output_options,
 )
 from memscal.formats.files import together
@@ -31,7 +30,7 @@ def _indenter(ctx: click.Context, param: click.Parameter, text: str) -> Any:
     shape, _, radius = text.partition(":")
     if text == "point":
         return text
-    if shape not in ("rod", "sphere"):
+    if shape not in ("rod", "sphere") or not radius:
         raise click.BadParameter(f"{text!r} is not point, rod:MM or sphere:MM.", ctx, param)
     return indenter_from(shape, {"radius": Quantity("mm").convert(radius, param, ctx)})
 
@@ -48,7 +47,9 @@ def _indenter(ctx: click.Context, param: click.Parameter, text: str) -> Any:
 @option("--rest", FILE, metavar="rest.csv")(
     "Frames without contact, whose mean is subtracted; without them frames are tared."
 )
-@out_option("Table to write (.csv): place and force of each frame, with uncertainties and flags.")
+@option("-o --output", out.FigurePath((".csv",)), metavar="contacts.csv")(
+    "Table to write: place and force of each frame, with uncertainties and flags."
+)
 @output_options
 def command(
     array: Path, frames: Path, rest: Path | None, output: Path | None, **options: Any

@@ -13,11 +13,13 @@ from memscal.model.quantities import MM, Quantity, measured
 from memscal.summaries.declared import members
 from memscal.summaries.table import Table, percent
 
-#: Of more frames the first are printed, with so many columns; digits of numbers there and in files.
+#: Of more frames the first are printed, with so many columns; digits of numbers there, in files, and
+#: of what is carried over.
 _PRINTED = 20
 _COLUMNS = 8
 _SHORT = 4
 _LONG = 9
+_CARRIED = 15
 
 
 def _quantities(contacts: Contacts) -> tuple[Quantity, ...]:
@@ -103,6 +105,7 @@ def _cells(contacts: Contacts, digits: int) -> tuple[list[str], list[tuple[str, 
         if quantity.name == "flags":
             heads[-1] = "flags"
         else:
-            column = [f"{number:.{digits}g}" for number in column / quantity.scale]
+            shown = _CARRIED if quantity.name in ("frame", "time") else digits
+            column = [f"{number:.{shown}g}" for number in column / quantity.scale]
         columns.append(["" if cell == "nan" else cell for cell in column])
     return heads, [*zip(*columns, strict=True)]

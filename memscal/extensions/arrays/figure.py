@@ -91,7 +91,7 @@ def _draw_places(axes: Axes, array: SensorArray) -> None:
 def _draw_crosstalk(axes: Axes, array: SensorArray) -> None:
     """Draw the crosstalk that is identified, with its uncertainty."""
     errors = array.crosstalk_uncertainties
-    known = array.estimated & (errors <= IDENTIFIED) & identified(array)
+    known = array.estimated & identified(array)
     crosstalk = 100 * np.where(known, array.crosstalk, np.nan)
     largest = 200 * np.max(abs(array.crosstalk), where=known, initial=IDENTIFIED)
     u = f"u up to {percent(errors[known].max())}" if known.any() else "not identified"

@@ -4,6 +4,7 @@ The records of its groups stand in ``files.toml``.
 """
 
 import tomllib
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -120,15 +121,43 @@ def read_open(file: SafeFile) -> ArrayData:
         "process": groups.read_process(file),
     }
     data = ArrayData(**{n: read[n] for n in read.keys() & ArrayData.__dataclass_fields__.keys()})
-    # A line tells one of x and y of each sensor, and of none the other one.
-    told = np.isfinite(data.centres[data.used])
-    kernel = np.fmax.reduce(data.kernels)
-    numbers = np.vstack([data.k, kernel, data.modes.changes, read.get("reference", 0.0 * kernel)])
-    finite = np.isfinite(numbers).all()
-    if not finite or len(np.unique(told, axis=0)) != 1 or len(data.pairs) != len(read["of_c"]):
+    if len(data.pairs) != len(read["of_c"]):
+        raise FormatError(f"{file.name} states the crosstalk of other pairs than it estimated.")
+    faults = list(_faults(data))
+    if faults:
         raise FormatError(
-            f"{file.name} has kernels or centres that are not finite, no sensor that is used, or "
-            "not the pairs of which it states the crosstalk.",
+            f"{file.name} is of no calibration: {', '.join(faults)}.",
             cure="Calibrate the array again.",
         )
     return data
+
+
+def _faults(data: ArrayData) -> Iterator[str]:
+    """Yield what of an array no calibration has found."""
+    used = data.used
+    if not used.any():
+        yield "no sensor is used"
+        return
+    if len({*data.sensors, ""}) <= used.size:
+        yield "sensors have the same name, or none"
+    # A line tells one of x and y of each sensor, and of none the other one.
+    told = np.isfinite(data.centres[used])
+    if len(np.unique(told, axis=0)) > 1 or not np.isfinite(data.line_y):
+        yield "some centres are not known"
+    if len(np.unique(data.places[used], axis=0)) < used.sum():
+        yield "sensors are at one place"
+    kernel = np.fmax.reduce(data.kernels)
+    reference = 0.0 * kernel if data.reference is None else data.reference
+    if not np.isfinite(np.vstack([data.k, kernel, data.modes.changes, reference])).all():
+        yield "kernels are not finite"
+    if np.any(np.diff(data.k) <= 0) or not np.all(abs(data.modes.owner + 0.5) < used.size):
+        yield "wavenumbers do not increase, or a mode has no sensor"
+    a = data.conversion_constants[used]
+    if data.kernel != "measured" and not np.all((a > 0) & np.isfinite(a)):
+        yield "conversion constants are not finite and above zero"
+    crosstalk = data.crosstalk[np.ix_(used, used)]
+    if not np.isfinite(crosstalk).all() or np.any(np.diag(crosstalk) != 1):
+        yield "crosstalk is not finite, or not 1 of a sensor with itself"
+    noise = np.nan_to_num(data.noise[np.ix_(used, used)], posinf=0.0)
+    if np.linalg.eigvalsh(noise).min() <= 0:
+        yield "noise is no covariance"

@@ -22,8 +22,8 @@ _UNKNOWN = "--|number of the column"
 
 
 @contextmanager
-def _without_options() -> Iterator[None]:
-    """Say what cures a table of frames where the cure would be an option of import."""
+def without_options(rows: str) -> Iterator[None]:
+    """Say which rows a table needs where the cure would be an option of import."""
     try:
         yield
     except InputError as error:
@@ -32,13 +32,14 @@ def _without_options() -> Iterator[None]:
         raise type(error)(
             error.problem,
             why="" if "--" in error.why else error.why,
-            cure="Correct the table: one head with each sensor once and its unit ('T00 [mV]'), "
-            "below it numbers with a decimal point, parted by commas, and empty cells where a "
-            "sensor did not read or was overloaded.",
+            cure=f"Correct the table: {rows}, cells parted by commas, with a decimal point.",
         ) from error
 
 
-@_without_options()
+@without_options(
+    "one head with each sensor once and its unit ('T00 [mV]'), below it numbers, and empty cells "
+    "where a sensor did not read or was overloaded"
+)
 def read_frames(array: ArrayData, path: FilePath) -> tuple[FloatArray, Values]:
     """Return readings (frames, sensors), and ``frame`` and ``time`` where they stand in a table.
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from memscal.errors import InputError
+from memscal.extensions.arrays.frames import without_options
 from memscal.formats.tables.columns import NamedColumns, Wanted
 from memscal.formats.tables.dialect import is_number
 from memscal.formats.tables.scan import ImportedScan
@@ -16,11 +17,14 @@ from memscal.formats.tables.sheets import open_table
 from memscal.formats.tables.stated import TableLayout
 from memscal.formats.units import to_si
 from memscal.model.arrays import Columns, FloatArray, Values
+from memscal.model.checks import at_ceiling_text, import_notes
 from memscal.model.scan import Scan
 
 #: Begins the names of the readings of each sensor, of which ``u_zz`` is the sum.
 _OF = "u_zz of "
 _ERRORS = "u_zz_errors of "
+#: Stands, with its place added, for the name of a sensor that is no number: no cell holds as much.
+_NAMED = 1e12
 
 
 def columns_of_array(
@@ -82,23 +86,45 @@ def array_scan(
     stored = [name for name in channels if name.startswith(_OF)]
     u_zz = np.stack([channels.pop(name) for name in stored])
     names = [name.removeprefix(_OF) for name in stored]
-    stated: Values = {} if layout is None else read_layout(layout, names)
+    stated: Values = {}
+    notes = []
+    if layout is not None:
+        stated, note = read_layout(layout, names)
+        notes.append(note)
     if ceiling is not None:  # a calibration leaves out what is there, and says of which sensor
-        stated["reading_high"] = to_si(ceiling, of.unit, of.dimension, "ceiling (--ceiling)")
+        high = to_si(ceiling, of.unit, of.dimension, "ceiling (--ceiling)")
+        stated["reading_high"] = high
+        at_ceiling = np.sum(u_zz >= high)
+        if at_ceiling == np.isfinite(u_zz).sum():
+            raise InputError(
+                f"All {at_ceiling} readings are at the ceiling of {ceiling:g} {of.unit} or above it.",
+                cure="Give the ceiling in the unit of the readings (--ceiling), or leave it out.",
+            )
+        notes.append(at_ceiling_text(at_ceiling))
     own = [channels.pop(name) for name in scan.channels if name.startswith(_ERRORS)]
     if scan.u_zz_errors is not None:  # of holds each sensor has its own
         stated["u_zz_errors"] = np.broadcast_to(own or [scan.u_zz_errors], u_zz.shape)
-    array = replace(scan, u_zz=u_zz, channels=channels, sensors=tuple(names), **stated)
+    array = replace(
+        scan,
+        u_zz=u_zz,
+        channels=channels,
+        sensors=tuple(names),
+        messages=(*scan.messages, *import_notes(notes)),
+        notes="\n".join([scan.notes, *notes]),
+        **stated,
+    )
     most = int(np.nan_to_num(u_zz).argmax()) // scan.u_zz.size
     return array, array.of_sensor(most)
 
 
-def read_layout(source: Any, sensors: Sequence[str]) -> Values:
-    """Return layout and layout_uncertainty, in m, of a table that names each sensor once."""
+@without_options(
+    "one head (sensor, 'x [mm]', 'y [mm]', board by a number), below it a row for each sensor"
+)
+def read_layout(source: Any, sensors: Sequence[str]) -> tuple[Values, str]:
+    """Return what a table states that names each sensor once, lengths in m; and a note on it."""
     table = open_table(source)
-    # Cells that are all numbers are read as numbers, and others as the place of their word.
-    numeric = all(map(is_number, sensors))
-    keys = [float(name) if numeric else i for i, name in enumerate(sensors)]
+    # A cell that is a number is read as one, and a name by what stands for it.
+    keys = [float(name) if is_number(name) else _NAMED + i for i, name in enumerate(sensors)]
     words = {name.lower(): key for name, key in zip(sensors, keys, strict=True)}
     fields = {"layout": ("x", "y")}
     if "x_errors" in table.heads:
@@ -109,11 +135,20 @@ def read_layout(source: Any, sensors: Sequence[str]) -> Values:
     if "board" in table.heads:
         wanted["board"] = Wanted("board")
     columns = table.columns(wanted)
+    for name, values in columns.items():
+        empty = np.flatnonzero(np.isnan(values))
+        if empty.size:
+            raise InputError(
+                f"{table.where(name)} is empty in {table.lines(empty)}.",
+                why="A layout states all of each sensor.",
+                cure="Fill in the cells, or leave the column x_errors, y_errors or board out.",
+            )
     found = columns["sensor"].tolist()
-    if sorted(found) != sorted(keys):
+    wrong = [name for name, key in zip(sensors, keys, strict=True) if found.count(key) != 1]
+    if wrong or len(found) > len(keys):
         raise InputError(
-            f"{table.where('sensor')} does not name each of these exactly once: "
-            f"{', '.join(sensors)}.",
+            f"{table.where('sensor')} has {len(found)} rows for {len(keys)} sensors, and does not "
+            f"name exactly once: {', '.join(wrong) or 'those of the other rows'}.",
             why="A layout says where each sensor is, by the name of its column of readings.",
             cure="Give each sensor one row, and no other.",
         )
@@ -122,4 +157,8 @@ def read_layout(source: Any, sensors: Sequence[str]) -> Values:
         field: np.column_stack([columns[name] for name in names])[order]
         for field, names in fields.items()
     }
-    return {"board": columns["board"][order], **stated} if "board" in columns else stated
+    if "board" in columns:
+        stated["board"] = columns["board"][order]
+    file = table.source
+    name = "" if file is None else f" from {file.file_name} (SHA-256 {file.sha256})"
+    return stated, f"Read{name}: {', '.join(stated)}."

@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import chdtrc
 
-from memscal.errors import InputError
+from memscal.errors import InputError, placed
 from memscal.extensions.arrays.array_data import ArrayData
 from memscal.extensions.arrays.contacts import Contacts
 from memscal.extensions.arrays.measured_fields import MeasuredFields
@@ -38,9 +38,10 @@ from memscal.model.arrays import (
     IndexArray,
     array_record,
     floats,
+    frozen_array,
     require_non_negative,
+    require_size,
     slices,
-    unmasked,
 )
 from memscal.model.checks import FALSE_ALARM
 from memscal.model.indenter import Rod, RoundIndenter, Sphere
@@ -91,6 +92,7 @@ class Seeking:
     def on(cls, array: ArrayData, indenter: Touch, shear: float, margin: float = MARGIN) -> Seeking:
         """Return how contacts are sought on an array, up to so many thicknesses outside it."""
         require_non_negative("shear", shear)
+        require_size("shear", shear)
         fields = fields_of(array, indenter)
         if array.kernel == "measured":
             # Only presses like those of the scan are known, and no place beyond it.
@@ -285,6 +287,13 @@ def locate(
     fields = seeking.fields
     readings = columns_of(array, u, "u")
     zero, scatter = _zero(array, rest)
+    silent = array.used & np.isnan(zero) & np.isfinite(readings).any(axis=0)
+    if silent.any():
+        raise InputError(
+            f"rest holds no reading of {', '.join(np.array(array.sensors)[silent])}.",
+            why="Without its reading at rest none of a sensor's readings is that of a contact.",
+            cure="Give frames without contact in which it reads, or mark its readings as missing.",
+        )
     saturated = at_an_end(array, readings, tared=rest is None)
     values = np.where(saturated, np.nan, readings - zero)[:, fields.sensors]
     state = np.full((len(values), 5), np.nan)
@@ -341,12 +350,14 @@ def locate(
 
 def columns_of(array: ArrayData, readings: ArrayLike, name: str) -> FloatArray:
     """Return readings as frames; refuse another number of columns than that of the sensors."""
-    frames = np.atleast_2d(floats(unmasked(readings)))
+    with placed(f"The array {name}"):
+        frames = np.atleast_2d(frozen_array(readings))
+    require_size(name, frames, smallest=0.0)
     count = len(array.sensors)
     if frames.ndim != 2 or frames.shape[1] != count:
         raise InputError(
-            f"{name} has {frames.shape[-1]} columns, but the array has {count} sensors. "
-            f"It has {frames.ndim} dimensions, and frames have 2.",
+            f"{name} has {frames.shape[-1]} columns, but the array has {count} sensors; of its "
+            f"shape, {frames.shape}, the first is the frame and the second the sensor.",
             why="Each frame is one reading of every sensor, also of those that are not used.",
             cure="Give the columns in the order of array.sensors, NaN where a reading is missing.",
         )

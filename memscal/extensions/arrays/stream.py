@@ -55,6 +55,7 @@ from memscal.model.arrays import (
     IndexArray,
     array_record,
     floats,
+    frozen_array,
     require_non_negative,
     require_positive,
 )
@@ -260,16 +261,16 @@ class Stream:
             If the state is not of such a stream.
         """
         now = vars(self._now)
-        given: Any = state
-        given = given if isinstance(given, Mapping) else {}
-        fits = all(np.shape(given.get(name, [[]])) == value.shape for name, value in now.items())
+        stated: Any = state if isinstance(state, Mapping) else {}
+        given = {name: frozen_array(stated.get(name, [[]])) for name in now}
+        fits = all(given[name].shape == value.shape for name, value in now.items())
         # What it was made with: rate, fields, noise, drift and limits.
-        if not fits or not np.allclose(
+        if not (fits and given["frames"] >= 0) or not np.allclose(
             given["made"], self._now.made, rtol=1e-6, atol=0.0, equal_nan=True
         ):
             raise InputError("The state is not of a stream of this array and these arguments.")
         for name, value in now.items():
-            value[...] = state[name]
+            value[...] = given[name]
 
     @property
     def _dropped(self) -> BoolArray:

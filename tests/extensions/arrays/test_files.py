@@ -86,25 +86,46 @@ def test_a_changed_file_is_refused_or_accepted_on_record(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "path",
+    ("path", "value", "words"),
     [
-        "kernel/k",
-        "kernel/transfer",
-        "kernel/changes",
-        "kernel/reference",
-        "sensors/centre_x",
-        "sensors/used",
-        "crosstalk/estimated",
+        ("kernel/k", np.nan, "kernels are not finite"),
+        ("kernel/k", 1e9, "do not increase"),
+        ("kernel/transfer", np.nan, "kernels are not finite"),
+        ("kernel/changes", np.nan, "kernels are not finite"),
+        ("kernel/reference", np.nan, "kernels are not finite"),
+        ("kernel/owner", 9, "a mode has no sensor"),
+        ("sensors/centre_x", np.nan, "centres are not known"),
+        ("sensors/line_y", np.nan, "centres are not known"),
+        ("sensors/used", np.nan, "no sensor is used"),
+        ("sensors/conversion_constant", -1e-7, "not finite and above zero"),
+        ("sensors/conversion_constant", np.nan, "not finite and above zero"),
+        ("crosstalk/estimated", np.nan, "other pairs"),
+        ("crosstalk/c", np.nan, "crosstalk is not finite"),
+        ("crosstalk/c", 2.0, "not 1 of a sensor with itself"),
+        ("noise/correlation", 5.0, "no covariance"),
+        ("noise/deviation", np.inf, "no covariance"),
+        ("noise/deviation", 0.0, "no covariance"),
     ],
 )
-def test_an_altered_file_with_numbers_that_are_none_is_refused(path, tmp_path):
+def test_an_altered_file_with_numbers_of_no_calibration_is_refused(path, value, words, tmp_path):
     file = tmp_path / "array.h5"
     full_array().save(file)
     with h5py.File(file, "a") as altered:
-        which = slice(None) if path in ("sensors/used", "crosstalk/estimated") else 0
-        altered[f"entry/{path}"][..., which] = np.nan
-    with pytest.raises(FormatError, match="not finite"):
+        whole = path in ("sensors/used", "sensors/line_y", "crosstalk/estimated")
+        altered[f"entry/{path}"][() if whole else (..., 0)] = value
+    with pytest.raises(FormatError, match=words):
         memscal.load_array(file, accept_altered=True)
+
+
+def test_sensors_of_one_name_or_place_are_refused(tmp_path):
+    array = full_array()
+    for name, change in {
+        "name": {"sensors": (array.sensors[0],) * len(array.sensors)},
+        "place": {"centres": array.centres[:1] + 0 * array.centres},
+    }.items():
+        replace(array, **change).save(tmp_path / f"{name}.h5")
+        with pytest.raises(FormatError, match=name):
+            memscal.load_array(tmp_path / f"{name}.h5")
 
 
 def test_half_a_layout_is_none(tmp_path):

@@ -48,9 +48,9 @@ def test_columns_become_sensors_in_their_order_with_their_places(run):
     [
         (["u_A", "u_*"], LAYOUT, "u_A, u_A"),
         (["u_A", "v*"], LAYOUT, "'v.*'"),
-        ("u_*", LAYOUT.replace("u_B,", "u_A,"), "exactly once"),
+        ("u_*", LAYOUT.replace("u_B,", "u_A,"), "3 rows for 3 sensors, .* exactly once: u_A, u_B"),
         ("u_*", LAYOUT.replace("u_B,", "u_D,"), "none of u_a, u_c, u_b, in line 2 .'u_D'"),
-        ("u_*", LAYOUT.replace("-4,", ","), "5 finite values"),
+        ("u_*", LAYOUT.replace("-4,", ","), "column .x. is empty in line 3"),
         ("u_A", LAYOUT, "names these sensors: none; .*\n.*single sensor has no layout"),
     ],
 )

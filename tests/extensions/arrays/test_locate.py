@@ -339,7 +339,15 @@ def test_the_assumed_shear_is_always_said():
         ({"u": np.zeros((2, 16)), "rest": np.zeros(3)}, ["rest has 3 columns", "16 sensors"]),
         ({"u": np.zeros((2, 16)), "indenter": "rod"}, ["'rod'"]),
         ({"u": np.zeros((2, 16)), "shear": -1.0}, ["shear is -1"]),
-        ({"u": np.zeros((1, 2, 16))}, ["3 dimensions"]),
+        ({"u": np.zeros((1, 2, 16))}, ["(1, 2, 16), the first is the frame"]),
+        ({"u": "text"}, ["array u: An array of numbers is needed"]),
+        ({"u": np.full((2, 16), 1e160)}, ["u is 1e+160", "no quantity"]),
+        ({"u": np.zeros((2, 16)), "shear": "0.3"}, ["shear is '0.3'", "one number"]),
+        ({"u": np.zeros((2, 16)), "shear": 1e200}, ["shear is 1e+200"]),
+        (
+            {"u": np.zeros((2, 16)), "rest": np.where(np.arange(16) == 3, np.nan, 0.0)},
+            ["rest holds no reading of T03"],
+        ),
     ],
 )
 def test_what_makes_no_sense_is_refused(arguments, words):
@@ -355,9 +363,11 @@ def test_what_makes_no_sense_is_refused(arguments, words):
         (lambda: GRID.predict([[0.0, 0.0]], np.nan), "not finite"),
         (lambda: GRID.predict([[0.0, 0.0]], [1.0, 1.0, 1.0]), r"forces have shape \(3,\)"),
         (lambda: GRID.predict(np.zeros((2, 2)), shear=np.ones((3, 2))), r"shears \(3, 2\)"),
+        (lambda: GRID.predict([["a", "b"]]), "array of numbers is needed"),
         (lambda: GRID.bound([[0.0, 0.0]], [1.0, 1.0]), r"forces have shape \(2,\)"),
+        (lambda: GRID.bound([[0.0, 0.0]], shear=[0.1, 0.2]), "one number is needed"),
         (lambda: GRID.bound([[0.0, 0.0]], 0.0), "force is 0 N"),
-        (lambda: GRID.bound([[0.0, 0.0]], [1.0, -1.0]), "force is -1 N"),
+        (lambda: GRID.bound(np.zeros((2, 2)), [1.0, -1.0]), "force is -1 N"),
     ],
 )
 def test_no_contact_is_predicted(work, words):
