@@ -37,7 +37,6 @@ def artifact_from(file: SafeFile) -> ApparatusData:
     require_schema(file, ARTIFACT_SCHEMA)
     require_unaltered(file)
     load = read_record(records.LOAD, file, "/entry/indenter", defaults={"load": None})["load"]
-    film, indenter = groups.read_stated(file)
     process = groups.read_process(file)
     u_zz = "/entry/reconvolution/u_zz"
     reading = reading_of(file.units_of(u_zz) or "V", file.where(u_zz))
@@ -55,8 +54,6 @@ def artifact_from(file: SafeFile) -> ApparatusData:
         parameters=groups.read_parameters(file, "/entry/parameters", reading),
         budget=groups.read_budget(file, "/entry/parameters/budget"),
         checks=groups.read_quality(file),
-        film=film,
-        indenter=indenter,
         **groups.read_circumstances(file),
         load=load,
         reference=groups.read_profile(file, load=load),

@@ -294,15 +294,6 @@ def read_film(file: SafeFile, path: str) -> ElasticFilm:
         return ElasticFilm(**read_record(records.FILM, file, path))
 
 
-def read_stated(file: SafeFile) -> tuple[ElasticFilm | None, RoundIndenter | None]:
-    """Read the film and the indenter of a scan or an artifact, where it states them."""
-    film = "/entry/sample/film"
-    indenter = "/entry/indenter"
-    stated = any(file.has(f"{indenter}/{name}") for name in ("shape", "radius"))
-    rod_or_sphere = read_round_indenter(file, indenter) if stated else None
-    return read_film(file, film) if file.has(film) else None, rod_or_sphere
-
-
 #: NeXus has samples and sensors say what moves them: nothing here, the indenter moves.
 _NOWHERE = {"depends_on": "."}
 
@@ -392,10 +383,17 @@ def circumstances(of: Scan | ApparatusData) -> Nodes:
 
 
 def read_circumstances(file: SafeFile) -> Values:
-    """Read when, by whom and with which instruments a scan was made."""
-    user = read_record(records.USER, file, "/entry/user")
-    times = read_record(records.TIMES, file, "/entry")
-    return {**read_instrument(file), "user": User(**user), **times}
+    """Read what a scan pressed on what, where it is stated; when, by whom, with what instruments."""
+    film = "/entry/sample/film"
+    indenter = "/entry/indenter"
+    stated = any(file.has(f"{indenter}/{name}") for name in ("shape", "radius"))
+    return {
+        "film": read_film(file, film) if file.has(film) else None,
+        "indenter": read_round_indenter(file, indenter) if stated else None,
+        **read_instrument(file),
+        "user": User(**read_record(records.USER, file, "/entry/user")),
+        **read_record(records.TIMES, file, "/entry"),
+    }
 
 
 def profile_groups(profile: StressProfile) -> tuple[Group, Group, Group]:

@@ -91,17 +91,15 @@ def scan_from(file: SafeFile, most: int | None = None, schema: str = writer.SCAN
     load = read_record(records.LOAD, file, "/entry/indenter", defaults={"load": None})
     with placed(file.where("/entry/indenter/friction_coefficient")):
         require_rod_friction(load.get("rod_friction"))
-    film, indenter = groups.read_stated(file)
+    stated = groups.read_circumstances(file)
+    stated["title"] = file.optional_text("/entry/title")
+    stated["notes"] = file.optional_text("/entry/notes/data")
     reading = reading_of(file.units_of(_SIGNAL) or "V", file.where(_SIGNAL))
     if file.attribute(_DATA, "axes") in ("time", ("time",)):
         # Under an indenter it is a dwell record, else a noise record.
         return Scan(
             **(load | _read_rest(file, _DATA, reading)),
-            indenter=indenter,
-            film=film,
-            **groups.read_circumstances(file),
-            title=file.optional_text("/entry/title"),
-            notes=file.optional_text("/entry/notes/data"),
+            **stated,
             source=file.source,
         )
     axes = _find_axes(file)
@@ -129,13 +127,9 @@ def scan_from(file: SafeFile, most: int | None = None, schema: str = writer.SCAN
         channels={name: arrays.pop(name) for name in _CHANNELS if name in arrays},
         **arrays,
         **load,
-        indenter=indenter,
-        film=film,
         unit=reading.si,
         **contact,
-        **groups.read_circumstances(file),
-        title=file.optional_text("/entry/title"),
-        notes=file.optional_text("/entry/notes/data"),
+        **stated,
         reference=reference,
         noise_record=_read_record(file),
         synthetic=_read_synthetic(file),
