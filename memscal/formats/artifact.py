@@ -87,7 +87,7 @@ def artifact_tree(data: ApparatusData) -> Group:
         "instrument": groups.instrument_group(data),
         **groups.circumstances(data),
         "indenter": groups.indenter_group(data.indenter, data),
-        **groups.reference_groups(data.reference),
+        **groups.profile_groups(data.reference),
         "process": write_record(records.PROCESS, data.process),
     }
     if data.assumptions:

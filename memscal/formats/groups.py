@@ -383,7 +383,7 @@ def circumstances(of: Scan | ApparatusData) -> Nodes:
 
 
 def read_circumstances(file: SafeFile) -> Values:
-    """Read what a scan pressed on what, where it is stated; when, by whom, with what instruments."""
+    """Read what was pressed on what, where it is stated, when, by whom, and with what."""
     film = "/entry/sample/film"
     indenter = "/entry/indenter"
     stated = any(file.has(f"{indenter}/{name}") for name in ("shape", "radius"))
@@ -396,7 +396,7 @@ def read_circumstances(file: SafeFile) -> Values:
     }
 
 
-def profile_groups(profile: StressProfile) -> tuple[Group, Group, Group]:
+def profile_groups(profile: StressProfile, prefix: str = "reference_") -> Nodes:
     """Return a stress profile as NXdata, its parameters, and how it was calculated."""
     film = profile.film
     indenter = profile.indenter
@@ -409,8 +409,11 @@ def profile_groups(profile: StressProfile) -> tuple[Group, Group, Group]:
     solution: Nodes = {"numerics": numerics} if numerics.children else {}
     solution |= write_record(records.PROFILE_NOTES, profile).children
     data = write_record(records.PROFILE, profile) if profile.form is None else _form(profile.form)
-    parameters = write_record(records.CONTACT, profile, **contact)
-    return data, parameters, write_record(records.SOLVER, profile, **solution)
+    return {
+        "reference": data,
+        f"{prefix}parameters": write_record(records.CONTACT, profile, **contact),
+        f"{prefix}process": write_record(records.SOLVER, profile, **solution),
+    }
 
 
 def _form(form: IdealReference | StressField) -> Group:
@@ -446,12 +449,6 @@ def read_field(file: SafeFile, path: str) -> StressField:
         return StressField(
             x=along_x, y=along_y, values=values, unit=unit, load=load, source=file.source
         )
-
-
-def reference_groups(profile: StressProfile) -> Nodes:
-    """Return the groups of a stress profile within the entry of a scan or an artifact."""
-    names = ("reference", "reference_parameters", "reference_process")
-    return dict(zip(names, profile_groups(profile), strict=True))
 
 
 def read_profile(

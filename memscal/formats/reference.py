@@ -204,7 +204,5 @@ def write_reference(profile: StressProfile, path: FilePath, *, overwrite: bool =
     ...     read_reference(f"{folder}/rod.h5").load
     1.0
     """
-    data, parameters, process = profile_groups(profile)
-    stored = {"reference": data, "parameters": parameters, "process": process}
-    entry = Group("NXentry", stored, {"default": "reference"})
+    entry = Group("NXentry", profile_groups(profile, prefix=""), {"default": "reference"})
     write_tree(file_tree(REFERENCE_SCHEMA, entry), path, overwrite=overwrite)

@@ -220,7 +220,7 @@ def scan_entry(scan: Scan) -> Group:
     if scan.notes:
         children["notes"] = writer.note(scan.notes)
     if scan.reference is not None:
-        children |= groups.reference_groups(scan.reference)
+        children |= groups.profile_groups(scan.reference)
     if scan.synthetic is not None:
         children["synthetic"] = _synthetic_group(scan.synthetic)
     return Group("NXentry", children, {"default": "data"})
