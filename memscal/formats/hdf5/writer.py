@@ -183,11 +183,10 @@ def file_tree(schema: str, entry: Group) -> Group:
     if schema in DEFINED:
         definition = Text(f"NX{schema.replace('-', '_')}", {"version": SCHEMA_VERSION})
         entry = replace(entry, children={"definition": definition, **entry.children})
-    root = Group("NXroot", {"entry": entry}, {"default": "entry", **schemas})
-    listed = _with_contents(root, "")
+    listed = _with_contents(entry, schemas, "")
     # The list names itself, so it is made once with a place for itself and once in full.
     contents = {path: sorted(_attributes(node)) for path, node in walk(listed)}
-    listed = _with_contents(root, to_json(contents))
+    listed = _with_contents(entry, schemas, to_json(contents))
     nodes = sorted(walk(listed), key=lambda item: item[0])
     digest = content_digest((path, node, _attributes(node)) for path, node in nodes)
     return replace(listed, attributes={**listed.attributes, DIGEST_ATTRIBUTE: digest})
@@ -220,12 +219,10 @@ def tree_to_bytes(root: Group) -> bytes:
     return data
 
 
-def _with_contents(root: Group, text: str) -> Group:
-    entry = root.children["entry"]
-    assert isinstance(entry, Group)
+def _with_contents(entry: Group, schemas: dict[str, str], text: str) -> Group:
     listing = note(text, media_type="application/json", description=_CONTENTS)
     entry = replace(entry, children={**entry.children, "contents": listing})
-    return replace(root, children={**root.children, "entry": entry})
+    return Group("NXroot", {"entry": entry}, {"default": "entry", **schemas})
 
 
 def _write_group(group: Any, node: Group) -> None:
