@@ -151,22 +151,6 @@ def branch_numbers(name: str, stated: ArrayLike) -> NDArray[np.int64]:
     return numbers.astype(np.int64)
 
 
-#: Loads farther apart than this share are not one load that scatters; fewer readings are no line.
-_APART = 0.1
-_FEWEST = 5
-_MOST_GROUPS = 12
-
-
-def load_groups(loads: FloatArray) -> IndexArray:
-    """Number loads in N, (n,), by the few that were set, ascending; all 0 if these are not seen."""
-    order = np.argsort(loads, kind="stable")
-    index = np.zeros(loads.size, dtype=np.intp)
-    index[order[1:]] = np.cumsum(np.diff(np.log(loads[order])) > _APART)
-    counts = np.bincount(index)
-    seen = counts.min() >= _FEWEST and counts.size <= _MOST_GROUPS
-    return index if seen else np.zeros_like(index)
-
-
 class SetUp(NamedTuple):
     """What a scan was made with; the load in N."""
 

@@ -23,12 +23,12 @@ from memscal.model.indenter import Rod, RoundIndenter
 from memscal.model.notation import Reading, format_measured
 from memscal.model.quantities import dimension_in
 from memscal.model.records import DYNAMICS, FILM, LOAD, ROUND_INDENTER, TAKEN_FOR_GRANTED
-from memscal.model.scan import BRANCHES, DIRECTIONS, ArrayOptions, Scan, branch_numbers, load_groups
+from memscal.model.scan import BRANCHES, DIRECTIONS, ArrayOptions, Scan, branch_numbers
 from memscal.progress import Listener, reported
 from memscal.readings.ceiling import without_clipped
 from memscal.readings.dead_rows import without_dead_rows
 from memscal.readings.find_holds import find_holds
-from memscal.readings.find_places import places_of
+from memscal.readings.find_places import clusters, places_of
 from memscal.readings.mistaken_unit import (
     require_depth,
     require_plausible,
@@ -66,6 +66,10 @@ _CLOSE = 0.1
 _MANY = 0.25
 #: Loads of one line that differ by more than this share were hardly meant to be one.
 _MIXED = 0.3
+#: Loads farther apart than this share are not one load that scatters; fewer readings are no line.
+_APART = 0.1
+_FEWEST = 5
+_MOST_GROUPS = 12
 
 
 @keyword_array_record
@@ -518,10 +522,11 @@ def _numbered_by_load(columns: Columns, notes: list[str]) -> str:
     loads = columns.get("normal_load")
     if loads is None or "y" in columns or not np.all(loads > 0):
         return ""
-    groups = load_groups(loads)
-    if not groups.any():
+    groups, _ = clusters(np.log(loads), _APART)
+    counts = np.bincount(groups)
+    if not 1 < counts.size <= _MOST_GROUPS or counts.min() < _FEWEST:
         return ""
-    levels = [f"{np.median(loads[groups == i]):.4g}" for i in range(groups.max() + 1)]
+    levels = [f"{np.median(loads[groups == i]):.4g}" for i in range(counts.size)]
     words = f"of {', '.join(levels[:-1])} and {levels[-1]} N"
     if "repeat" not in columns:
         columns["repeat"] = groups
