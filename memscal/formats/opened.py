@@ -55,9 +55,10 @@ def opened_scans(
     noise_record: Any = None,
 ) -> tuple[Scan, ...]:
     """Return scans that are given themselves or as paths, at least one; of ``most`` points each."""
-    listed = listed_items(scans)
-    stated = {"accept_altered": accept_altered, "noise_record": noise_record}
-    opened = [opened_scan(scan, most, **stated) for scan in listed]
+    opened = [
+        opened_scan(scan, most, accept_altered=accept_altered, noise_record=noise_record)
+        for scan in listed_items(scans)
+    ]
     require_different(map(contents_of, opened))
     return tuple(opened)
 
@@ -68,15 +69,13 @@ def opened_contacts(
     """Return scans and measured stresses that are given themselves or as paths, at least one."""
     opened: list[Scan | MeasuredStress] = []
     for item in listed_items(contacts):
-        if isinstance(item, MeasuredStress):
-            opened.append(item)
-        elif isinstance(item, str | PathLike):
+        if isinstance(item, str | PathLike):
             with open_hdf5(item, accept_altered=accept_altered) as file:
                 is_stress = file.attribute("/", SCHEMA_ATTRIBUTE) == STRESS_SCHEMA
-                read = stress_from(file) if is_stress else scan_from(file)
-            opened.append(read if is_stress else opened_scan(read, noise_record=noise_record))
-        else:
-            opened.append(opened_scan(item, noise_record=noise_record))
+                item = stress_from(file) if is_stress else scan_from(file)
+        if not isinstance(item, MeasuredStress):
+            item = opened_scan(item, noise_record=noise_record)
+        opened.append(item)
     if noise_record is not None and not all(isinstance(item, Scan) for item in opened):
         raise InputError(
             "A noise record and measured stress are given.",
