@@ -4,6 +4,7 @@ import hashlib
 import os
 import re
 from io import BytesIO
+from pathlib import PurePath
 from typing import Any
 
 import numpy as np
@@ -121,7 +122,7 @@ def length(text: str, what: str) -> float:
 def _read_pixels(path: FilePath, pixel_size: float | None) -> StressField:
     """Read a field from a 2-D array or an image."""
     data = read_bytes(path)
-    name = os.path.basename(os.fspath(path))
+    name = PurePath(path).name
     if pixel_size is None:
         raise InputError(
             f"The size of the pixels of {name} is not given.",
