@@ -18,7 +18,7 @@ from memscal.model import records
 from memscal.model.apparatus import ApparatusData, ParameterSet
 from memscal.model.arrays import Values, value_record
 from memscal.model.assumptions import Assumption
-from memscal.model.checks import QualityCheck, messages_from_json
+from memscal.model.checks import QualityCheck, QualityChecks, messages_from_json
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Cone, Indenter, Profile, Rod, RoundIndenter, Sphere
 from memscal.model.instrument import Dynamics, Equipment, LoadCell, StressSensor, User
@@ -38,6 +38,9 @@ from memscal.model.stress import IdealReference, StressField, StressProfile
 
 _NOTHING: Mapping[str, Any] = MappingProxyType({})
 _MeasuredOn = Scan | ApparatusData | MeasuredScan
+
+Budget = Mapping[str, Mapping[str, float]]
+"""Standard uncertainties by source, of each quantity."""
 
 
 @value_record
@@ -198,7 +201,7 @@ def parameter_dimension(name: str, unit: str = "", reading: Reading = VOLTS) -> 
     )
 
 
-def parameter_group(parameters: ParameterSet, budget: Mapping[str, Mapping[str, float]]) -> Group:
+def parameter_group(parameters: ParameterSet, budget: Budget) -> Group:
     """Return the parameters as an NXcollection."""
     stated = parameters.units or ("",) * len(parameters.names)
     dimensions = {
@@ -265,7 +268,7 @@ def named_collection(children: Mapping[str, Node]) -> Group:
     return Group("NXcollection", {"names": to_json(list(children)), **children})
 
 
-def budget_group(budget: Mapping[str, Mapping[str, float]], dimensions: Mapping[str, str]) -> Group:
+def budget_group(budget: Budget, dimensions: Mapping[str, str]) -> Group:
     """Return the uncertainty budget: one group per quantity, one number per source."""
     children = {}
     for quantity, sources in budget.items():
@@ -275,7 +278,7 @@ def budget_group(budget: Mapping[str, Mapping[str, float]], dimensions: Mapping[
     return named_collection(children)
 
 
-def read_budget(file: SafeFile, path: str) -> dict[str, dict[str, float]]:
+def read_budget(file: SafeFile, path: str) -> Budget:
     """Read the uncertainty budget, in SI units; empty where there is none."""
     budget = {}
     for quantity in file.text_list(f"{path}/names"):
@@ -506,7 +509,7 @@ def read_assumptions(file: SafeFile) -> tuple[Assumption, ...]:
     return tuple(assumptions)
 
 
-def quality_group(checks: tuple[QualityCheck, ...]) -> Group:
+def quality_group(checks: QualityChecks) -> Group:
     """Return the quality checks, one NXcollection each."""
     children = {}
     for check in checks:
@@ -517,7 +520,7 @@ def quality_group(checks: tuple[QualityCheck, ...]) -> Group:
     return named_collection(children)
 
 
-def read_quality(file: SafeFile) -> tuple[QualityCheck, ...]:
+def read_quality(file: SafeFile) -> QualityChecks:
     """Read the quality checks, in their order."""
     checks = []
     for name in file.text_list("/entry/quality/names"):

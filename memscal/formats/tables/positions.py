@@ -1,6 +1,6 @@
 """Positions of the readings of a table, of its columns or made, and the line that they are."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -8,11 +8,11 @@ import numpy as np
 from memscal.errors import InputError
 from memscal.extensions import hook
 from memscal.formats.tables.stated import TableLayout
-from memscal.model.arrays import Columns
+from memscal.model.arrays import Columns, Values
 from memscal.model.scan import LINE
 
 
-def require_positions(named: Mapping[str, Any], layout: TableLayout, *, resting: bool) -> None:
+def require_positions(named: Values, layout: TableLayout, *, resting: bool) -> None:
     """Refuse a table without positions, or with two kinds of them."""
     columns = named["x"] is not None or named["y"] is not None
     if resting:

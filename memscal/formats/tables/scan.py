@@ -287,7 +287,7 @@ def records_of(stated: Values) -> Values:
 
 
 def _require_use(
-    named: Mapping[str, Column | None],
+    named: Values,
     layout: TableLayout,
     conditions: ScanConditions,
     uncertainties: ScanUncertainties,
@@ -548,7 +548,7 @@ def _nominal_load(
     return load
 
 
-def _set_up_in_words(stated: Mapping[str, Any]) -> Iterator[str]:
+def _set_up_in_words(stated: Values) -> Iterator[str]:
     """Yield what was pressed on what, with each uncertainty, as it was taken."""
     film = stated["film"]
     indenter = stated["indenter"]
@@ -573,7 +573,7 @@ def _set_up_in_words(stated: Mapping[str, Any]) -> Iterator[str]:
             yield f"{name.capitalize()}: {', '.join(words) or 'not stated'}."
 
 
-def _granted_in_words(stated: Mapping[str, Any]) -> Iterator[str]:
+def _granted_in_words(stated: Values) -> Iterator[str]:
     """Yield which uncertainties are stated of what a scan else takes for granted."""
     words = []
     for quantity in TAKEN_FOR_GRANTED.quantities:
