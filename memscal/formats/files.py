@@ -126,7 +126,7 @@ class _Transaction:
             mode = None
             with suppress(FileNotFoundError):
                 mode = stat.S_IMODE(os.stat(target).st_mode)
-            flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC | os.O_NOFOLLOW
+            flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW
             # The umask sets the mode of a new one.
             descriptor = os.open(file.temporary, flags, 0o666 if mode is None else 0o600)
             file.locked.append(descriptor)
@@ -265,7 +265,7 @@ def _remove_orphans(folder: Path) -> None:
 
 
 def _remove_orphan(path: str) -> None:
-    descriptor = os.open(path, os.O_RDWR | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
+    descriptor = os.open(path, os.O_RDWR | os.O_NOFOLLOW | os.O_NONBLOCK)
     try:
         status = os.fstat(descriptor)
         if stat.S_ISREG(status.st_mode) and time.time() - status.st_mtime > _ORPHANED:
@@ -304,7 +304,7 @@ def read_pieces(path: FilePath, *, limit: int) -> Iterator[bytes]:
     """Yield the same in pieces of up to 1 MiB; a file that grows meanwhile meets the limit, too."""
     shown = os.fspath(path)
     try:
-        descriptor = os.open(shown, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC | os.O_NOCTTY)
+        descriptor = os.open(shown, os.O_RDONLY | os.O_NONBLOCK | os.O_NOCTTY)
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise InputError(
