@@ -303,11 +303,11 @@ _NOWHERE = {"depends_on": "."}
 
 def sample_group(of: _MeasuredOn) -> Group:
     """Return the NXsample that holds the film, and how it was lubricated."""
-    children = {}
+    children: Nodes = {}
     if of.film is not None:
         children["film"] = write_record(records.FILM, of.film)
-    sample = write_record(records.SAMPLE, of)
-    return Group("NXsample", {**children, **sample.children, **_NOWHERE})
+    children |= write_record(records.SAMPLE, of).children
+    return Group("NXsample", children | _NOWHERE)
 
 
 def indenter_group(indenter: Indenter | None, of: object = _NOTHING) -> Group:
@@ -380,9 +380,10 @@ def read_instrument(file: SafeFile, path: str = "/entry") -> Values:
 
 def circumstances(of: Scan | ApparatusData) -> Nodes:
     """Return when and by whom a scan was made, for the entry of a scan or an artifact."""
-    user = write_record(records.USER, of.user)
-    stated = {"user": user} if user.children else {}
-    return {**write_record(records.TIMES, of).children, **stated}
+    entry = dict(write_record(records.TIMES, of).children)
+    if of.user != User():
+        entry["user"] = write_record(records.USER, of.user)
+    return entry
 
 
 def read_circumstances(file: SafeFile) -> Values:
