@@ -483,8 +483,8 @@ class Scan:
         if film is None or indenter is None:
             cure = (
                 '--reference point (reference="point"), or another source in their place: centre '
+                "and width of the image, and a G in which film and rod blur"
             )
-            cure += "and width of the image, and a G in which film and rod blur"
         raise InputError(
             f"{self.source.file_name if self.source else 'The scan'} states no {missing}.",
             why="The stress that an indenter makes at the base of a film is calculated from them.",

@@ -540,12 +540,11 @@ def _nominal_load(
     """Take the median of a column as the nominal load; refuse one that contradicts the column."""
     if loads is None:
         return stated
-    load = stated
-    if load is None:
-        load = float(np.nanmedian(loads))
-        notes.append(f"The nominal load is the median of the column: {load:.4g} N.")
-    require_recorded(load, loads)
-    return load
+    if stated is None:
+        stated = float(np.nanmedian(loads))
+        notes.append(f"The nominal load is the median of the column: {stated:.4g} N.")
+    require_recorded(stated, loads)
+    return stated
 
 
 def _set_up_in_words(stated: Values) -> Iterator[str]:

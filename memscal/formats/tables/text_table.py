@@ -163,8 +163,8 @@ class TextTable(NamedColumns):
             self._unit_row = ()
             self._header = places[start]
         self._headed = bool(names)
-        self._width = max(len(names), *map(len, rows[start:]))
-        heads = [*names, *[""] * (self._width - len(names))]
+        longest = max(len(names), *map(len, rows[start:]))
+        heads = [*names, *[""] * (longest - len(names))]
         self.names = tuple(printable(c, MAX_NAME) or str(i + 1) for i, c in enumerate(heads))
         self._first = rows[start:], places[start:]
         self._columns = len(names) or width
@@ -226,7 +226,9 @@ class TextTable(NamedColumns):
             mark = "comma" if self.decimal == "," else "point"
             delimiter = DELIMITERS.get(self._delimiter, repr(self._delimiter))
             apart = f"separated by a {delimiter}, with a decimal {mark}"
-        notes.append(f"Read {counted(count, 'rows')} of {counted(self._width, 'columns')} {apart}.")
+        notes.append(
+            f"Read {counted(count, 'rows')} of {counted(len(self.names), 'columns')} {apart}."
+        )
         self.notes = tuple(notes)
 
     def _refuse_more_names(self) -> None:
