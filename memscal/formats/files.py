@@ -7,13 +7,12 @@ import re
 import secrets
 import stat
 import time
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
 from contextvars import ContextVar
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Self
 
 from memscal.errors import FormatError, InputError, MemscalError, OutputError, UnsafeFileError
 from memscal.model.notation import printable
@@ -83,39 +82,23 @@ class _File:
     target: Path
     overwrite: bool
     temporary: Path
-    locked: list[int] = field(default_factory=list)
     before: Path | None = None
     replaces: bool = False
     placed: bool = False
 
 
-class _Transaction:
+class _Transaction(ExitStack):
     """Files that are written and flushed beside their targets, and then renamed."""
 
     def __init__(self) -> None:
+        super().__init__()
         self._files: list[_File] = []
-        self._made: Path | None = None
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        for file in self._files:
-            for temporary in (file.temporary, file.before):
-                with suppress(OSError):
-                    if temporary is not None:
-                        os.unlink(temporary)
-            for descriptor in file.locked:
-                os.close(descriptor)
-        if self._made is not None:
-            with suppress(OSError):
-                self._made.rmdir()  # takes nothing from one that holds the files
 
     def make(self, folder: Path) -> None:
         """Make a folder for the files; one that is there stays."""
         with _blamed(folder), suppress(FileExistsError):
             folder.mkdir()
-            self._made = folder
+            self.callback(_removed, folder.rmdir)  # takes nothing from one that holds the files
 
     def write(self, target: Path, data: bytes | memoryview, overwrite: bool) -> None:
         """Write and flush a file beside its target; it keeps the permissions of the old one."""
@@ -129,8 +112,7 @@ class _Transaction:
             flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW
             # The umask sets the mode of a new one.
             descriptor = os.open(file.temporary, flags, 0o666 if mode is None else 0o600)
-            file.locked.append(descriptor)
-            _lock(descriptor)
+            self._lock(descriptor, file.temporary)
             remaining = memoryview(data)
             while remaining:
                 remaining = remaining[os.write(descriptor, remaining) :]
@@ -166,11 +148,16 @@ class _Transaction:
     def _keep(self, file: _File) -> None:
         """Give what is there a second name, locked; a disk without hard links has no way back."""
         with suppress(OSError):
-            descriptor = os.open(file.target, os.O_RDONLY)
-            file.locked.append(descriptor)
-            _lock(descriptor)
             file.before = _beside(file.target)
+            self._lock(os.open(file.target, os.O_RDONLY), file.before)
             os.link(file.target, file.before)
+
+    def _lock(self, descriptor: int, temporary: Path) -> None:
+        """Lock an open file, where the disk has locks, until its temporary name goes at the end."""
+        self.callback(os.close, descriptor)
+        self.callback(_removed, temporary.unlink)
+        with suppress(OSError):
+            fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
 
 
 _OPEN: ContextVar[_Transaction] = ContextVar("the files that are written together")
@@ -243,10 +230,10 @@ def _blamed(target: Path) -> Iterator[None]:
         raise OutputError(problem, why=_UNTOUCHED, cure=cure) from error
 
 
-def _lock(descriptor: int) -> None:
-    """Lock an open file for as long as it is open, where the disk has locks."""
+def _removed(remove: Callable[[], None]) -> None:
+    """Remove what is left of a file or folder, if anything is."""
     with suppress(OSError):
-        fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        remove()
 
 
 #: Seconds after which a temporary file without a lock is that of a process that was killed.
