@@ -8,7 +8,7 @@ import numpy as np
 
 from memscal.errors import InputError
 from memscal.formats.files import FilePath
-from memscal.formats.tables.columns import Wanted
+from memscal.formats.tables.columns import Column, Wanted
 from memscal.formats.tables.sheets import open_table
 from memscal.model.arrays import Arrays, Values, array_record, keyword_array_record
 from memscal.model.checks import Message, import_notes, marked_texts
@@ -181,8 +181,6 @@ def _compare_with_load(profile: StressProfile, samples: Samples) -> list[Message
     )
     return [*carried, Message("force_differs", warning, "warning")]
 
-
-Column = str | int
 
 # Radii that differ by less than this share of the largest are the same, but for rounding.
 _SAME = 1e-9

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from memscal.errors import InputError, counted, require_names
 from memscal.extensions import hook
-from memscal.formats.tables.columns import NamedColumns, Wanted
+from memscal.formats.tables.columns import Column, NamedColumns, Wanted
 from memscal.formats.tables.positions import direction_of, make_positions, require_positions
 from memscal.formats.tables.reference import require_sign
 from memscal.formats.tables.sheets import open_table
@@ -37,7 +37,6 @@ from memscal.readings.mistaken_unit import (
     warn_of_readings,
 )
 
-Column = str | int
 #: Dimension of a column, its unit as it is stated, the option that states it, and the default.
 Form = tuple[str, str | None, str, str | None]
 
@@ -251,7 +250,7 @@ def _require_sizes(scan: Scan) -> None:
 
 
 def _listed(column: Column | Sequence[Column] | None) -> list[Column]:
-    return [column] if isinstance(column, str | int) else list(column or ())
+    return [column] if isinstance(column, Column) else list(column or ())
 
 
 def scan_of_arrays(x: ArrayLike, u: ArrayLike, **options: Any) -> ImportedScan:
