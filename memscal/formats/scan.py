@@ -15,7 +15,7 @@ from memscal.formats.hdf5.reader import SafeFile, open_hdf5
 from memscal.formats.hdf5.writer import Group, Nodes, si
 from memscal.formats.units import reading_of
 from memscal.model import records
-from memscal.model.arrays import FloatArray, Values
+from memscal.model.arrays import Axes, FloatArray, Values
 from memscal.model.notation import Reading
 from memscal.model.quantities import by_name
 from memscal.model.scan import BRANCHES, LIKE_SIGNAL, Scan, branch_numbers, require_rod_friction
@@ -268,7 +268,7 @@ def _rest_group(record: Scan) -> Group:
     return Group("NXdata", data, {"signal": "u_zz", "axes": ("time",)})
 
 
-def _nodes(scan: Scan, axes: tuple[str, ...], **arrays: FloatArray | None) -> Nodes:
+def _nodes(scan: Scan, axes: Axes, **arrays: FloatArray | None) -> Nodes:
     """Return arrays along some axes; those with one more run along the sensors, too."""
     return {
         _DECLARED[name].key: si(
@@ -281,7 +281,7 @@ def _nodes(scan: Scan, axes: tuple[str, ...], **arrays: FloatArray | None) -> No
     }
 
 
-def _find_axes(file: SafeFile) -> tuple[str, ...] | None:
+def _find_axes(file: SafeFile) -> Axes | None:
     """Return the axes of the readings as they are stored; none where the shape alone tells them."""
     shape = file.array(_SIGNAL).shape if file.has(_SIGNAL) else ()
     several = file.has(f"{_DATA}/sensor_names")

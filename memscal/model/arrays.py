@@ -23,6 +23,9 @@ Columns = dict[str, NDArray[Any]]
 Values = dict[str, Any]
 """Arrays, and any values, by their names."""
 
+Axes = tuple[str, ...]
+"""Names of the axes of an array."""
+
 _Class = TypeVar("_Class")
 
 

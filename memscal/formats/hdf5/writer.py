@@ -17,7 +17,7 @@ from memscal.errors import InputError
 from memscal.formats.files import FilePath, atomic_write_bytes
 from memscal.formats.hdf5.limits import most_held
 from memscal.formats.units import from_si
-from memscal.model.arrays import Values, array_record
+from memscal.model.arrays import Axes, Values, array_record
 from memscal.model.notation import printable
 from memscal.model.sizes import too_large
 
@@ -37,7 +37,7 @@ DIGEST_ATTRIBUTE = "memscal_content_sha256"
 # The list of what was written: a reader can follow it without ever listing a group.
 CONTENTS_PATH = "/entry/contents/data"
 
-Attribute = str | int | tuple[str, ...]
+Attribute = str | int | Axes
 
 
 @array_record
@@ -46,7 +46,7 @@ class Number:
 
     values: NDArray[np.float64] | NDArray[np.int64]
     units: str
-    axes: tuple[str, ...] = ()
+    axes: Axes = ()
     attributes: Mapping[str, Attribute] = field(default_factory=dict)
 
 
@@ -73,7 +73,7 @@ Nodes = dict[str, Node]
 """Nodes of a group by their names."""
 
 
-def si(values: ArrayLike, dimension: str, axes: tuple[str, ...] = ()) -> Number:
+def si(values: ArrayLike, dimension: str, axes: Axes = ()) -> Number:
     """Return SI values as a number in the unit that our files use for their dimension."""
     return Number(*from_si(values, dimension), axes)
 
