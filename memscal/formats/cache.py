@@ -48,7 +48,7 @@ def table_key(content: Values) -> str:
 def keep_contact_table(folder: FilePath, key: str, arrays: Arrays) -> None:
     """Write arrays under their key, remove the oldest; where the disk takes none, keep none."""
     # value (M,), load (L,), k (K,), transforms (M, L, K) in N, all others (M, L).
-    children: Nodes = {
+    children = {
         name: Number(array, *_OTHERS.get(name, _TRANSFORM)) for name, array in arrays.items()
     }
     contacts = Group("NXdata", children, {"signal": "spectra", "axes": _TRANSFORM[1]})

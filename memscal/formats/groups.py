@@ -163,7 +163,7 @@ def _read(file: SafeFile, at: str, quantity: Quantity, lengths: dict[str, int]) 
 def origins(file: SafeFile, paths: Iterable[tuple[str, Quantity]]) -> Values:
     """Return the origin of a file as its quantities state it, by their names; JSON notes last."""
     texts: Values = {}
-    notes: Values = {}
+    notes = {}
     for at, quantity in paths:
         value = KINDS[quantity.dimension].read(file, at)
         name = quantity.origin
@@ -350,7 +350,7 @@ def _shape(file: SafeFile, path: str) -> str:
 
 def instrument_group(of: _MeasuredOn) -> Group:
     """Return the NXinstrument that holds the sensor, and load cell and stage if they are stated."""
-    dynamics: Nodes = {}
+    dynamics = {}
     if of.sensor.dynamics is not None:
         dynamics["dynamics"] = write_record(records.DYNAMICS, of.sensor.dynamics)
     parts = {"stress_sensor": write_record(records.SENSOR, of.sensor, **dynamics, **_NOWHERE)}
@@ -404,7 +404,7 @@ def profile_groups(profile: StressProfile, prefix: str = "reference_") -> Nodes:
     """Return a stress profile as NXdata, its parameters, and how it was calculated."""
     film = profile.film
     indenter = profile.indenter
-    contact: Nodes = {}
+    contact = {}
     if film:
         contact["film"] = write_record(records.FILM, film)
     if indenter:

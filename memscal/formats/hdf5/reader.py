@@ -109,7 +109,7 @@ class SafeFile:
         self.source = source
         self._accept_altered = accept_altered
         self._data = data
-        self._opened: dict[str, Any] = {"/": file["/"].id}
+        self._opened = {"/": file["/"].id}
         # Of a small file no more than it may well stand for.
         self._budget = self._most = limits.most_held(len(data))
         self.kept: dict[Any, Any] = {}

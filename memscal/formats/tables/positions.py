@@ -45,7 +45,7 @@ def make_positions(
     columns: Columns, layout: TableLayout, notes: list[str], name_rows: Callable[[Any], str]
 ) -> int | None:
     """Make the positions that no column states; return how many presses were counted for it."""
-    presses: int | None = None
+    presses = None
     if layout.speed is not None and "time" in columns:
         time = columns["time"]
         stated = np.flatnonzero(np.isfinite(time))
@@ -62,7 +62,7 @@ def make_positions(
             from scipy.integrate import cumulative_trapezoid
 
             # From the last reading forth to the first one back half of the time is forth.
-            way: Any = cumulative_trapezoid(np.nan_to_num(signs[stated]), time[stated], initial=0)
+            way = cumulative_trapezoid(np.nan_to_num(signs[stated]), time[stated], initial=0)
             columns["x"][stated] = abs(layout.speed) * way
         notes.append(f"The positions are {layout.speed * 1e3:.4g} mm/s times the time.")
     elif layout.step is not None:

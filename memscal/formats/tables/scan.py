@@ -278,7 +278,7 @@ def scan_of_arrays(x: ArrayLike, u: ArrayLike, **options: Any) -> ImportedScan:
 
 def records_of(stated: Values) -> Values:
     """Take the fields of layout, conditions and uncertainties from what is stated; return these."""
-    records: Values = {}
+    records = {}
     for name, record in _RECORDS.items():
         own = stated.keys() & {item.name for item in fields(record)}
         records[name] = record(**{field: stated.pop(field) for field in own})
