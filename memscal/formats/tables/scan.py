@@ -37,9 +37,6 @@ from memscal.readings.mistaken_unit import (
     warn_of_readings,
 )
 
-#: Dimension of a column, its unit as it is stated, the option that states it, and the default.
-Form = tuple[str, str | None, str, str | None]
-
 _RECORDS = {"layout": TableLayout, "conditions": ScanConditions, "uncertainties": ScanUncertainties}
 #: What of a layout is for who opens the table.
 _READING = ("sheet", "scan", "skip_rows", "missing", "delimiter", "decimal")
@@ -362,11 +359,12 @@ def _wanted(
     reading = reading_of(u_unit, table.where(u))
     of_u = dimension_in("voltage", reading)
     channel = (of_u, layout.u_unit, "u_unit (--u-unit)", u_unit)
-    force: Form = ("force", layout.load_unit, "load_unit (--load-unit)", "N")
-    length: Form = ("length", layout.x_unit, "x_unit (--x-unit)", None)
-    if layout.step is not None:
-        length = ("dimensionless", layout.x_unit, "x_unit (--x-unit)", "1")
-    forms: dict[str, Form] = {
+    force = ("force", layout.load_unit, "load_unit (--load-unit)", "N")
+    # With a step places are counted.
+    of_x, unit_of_x = ("length", None) if layout.step is None else ("dimensionless", "1")
+    length = (of_x, layout.x_unit, "x_unit (--x-unit)", unit_of_x)
+    # Dimension, unit as it is stated, the option that states it, and the default.
+    forms = {
         "u_zz": channel,
         "u_xz": channel,
         "u_yz": channel,
