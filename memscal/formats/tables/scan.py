@@ -479,8 +479,9 @@ def _scan_of(
             columns["repeat"] = np.append(0, np.cumsum(turns))
     loads_in_words = _numbered_by_load(columns, notes)
     stated["load"] = _nominal_load(columns.get("normal_load"), conditions.load, notes)
-    if load_scatter is not None and "normal_load" not in columns:
-        columns["normal_load"] = np.full(columns["u_zz"].shape, stated["load"])
+    if load_scatter is not None:
+        columns.setdefault("normal_load", np.full(columns["u_zz"].shape, stated["load"]))
+        columns["normal_load_errors"] = load_scatter * columns["normal_load"]
     along = direction_of(columns, notes)
     stated["direction"] = conditions.direction or along
     if conditions.motion != "rest":
@@ -497,14 +498,10 @@ def _scan_of(
     columns = _as_rows(columns)
     further = [name for name in columns if " of " in name or name.startswith(("u_xz", "u_yz"))]
     channels: Columns = {name: columns.pop(name) for name in further}
-    if load_scatter is not None:
-        columns["normal_load_errors"] = load_scatter * columns["normal_load"]
     if x_error is not None:
         columns["x_errors"] = np.full(columns["x"].size, x_error)
-    arrays: Values = dict(columns)
     return ImportedScan(
-        **arrays,
-        **stated,
+        **(stated | columns),
         unit=reading.si,
         source=table.source,
         channels=channels,
