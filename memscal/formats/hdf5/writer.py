@@ -135,9 +135,8 @@ def content_digest(items: Iterable[DigestItem]) -> str:
     total = hashlib.sha256()
     for path, value, attributes in items:
         kind, shape, data = _canonical(value)
-        plain = dict(attributes)
-        plain |= {n: printable(v, len(v)) for n, v in plain.items() if isinstance(v, str)}
-        item = [path, kind, shape, plain, hashlib.sha256(data).hexdigest()]
+        texts = {n: printable(v, len(v)) for n, v in attributes.items() if isinstance(v, str)}
+        item = [path, kind, shape, attributes | texts, hashlib.sha256(data).hexdigest()]
         line = json.dumps(item, sort_keys=True, separators=(",", ":"))
         total.update(line.encode("ascii") + b"\n")
     return total.hexdigest()

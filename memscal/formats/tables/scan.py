@@ -462,7 +462,7 @@ def _scan_of(
     holds: Holds | None,
 ) -> ImportedScan:
     """Return the scan of columns without gaps in their positions, and add to the notes."""
-    stated: Values = {**vars(conditions), **vars(uncertainties)}
+    stated = {**vars(conditions), **vars(uncertainties)}
     del stated["noise"]  # that of each reading is a column
     load_scatter = stated.pop("load_scatter")
     x_error = stated.pop("x_error")
@@ -497,7 +497,7 @@ def _scan_of(
         messages += _mixed_loads(columns["normal_load"], columns.get("repeat"), conditions.indenter)
     columns = _as_rows(columns)
     further = [name for name in columns if " of " in name or name.startswith(("u_xz", "u_yz"))]
-    channels: Columns = {name: columns.pop(name) for name in further}
+    channels = {name: columns.pop(name) for name in further}
     if x_error is not None:
         columns["x_errors"] = np.full(columns["x"].size, x_error)
     return ImportedScan(
