@@ -99,9 +99,13 @@ def artifact_tree(data: ApparatusData) -> Group:
         children["kernel_changes"] = _with_names(group, data.kernel_changes)
     if data.shared_effects:
         table = np.stack(list(data.shared_effects.values()))
-        changes = {"of_a": table[:, 0], "of_sigma": table[:, 1], "of_transfer": table[:, 2:]}
-        k = round_wavenumbers(data.resolved_wavenumber)
-        group = write_record(records.SHARED_EFFECTS, {"k": k, **changes})
+        effects = {
+            "k": round_wavenumbers(data.resolved_wavenumber),
+            "of_a": table[:, 0],
+            "of_sigma": table[:, 1],
+            "of_transfer": table[:, 2:],
+        }
+        group = write_record(records.SHARED_EFFECTS, effects)
         children["shared_effects"] = _with_names(group, data.shared_effects)
     if data.other is not None:
         name = "bayesian" if data.other.method == "bayesian" else "division"
@@ -133,9 +137,9 @@ def _read_effects(file: SafeFile) -> Arrays:
 
 
 def _read_changes(file: SafeFile) -> Arrays:
-    if not file.has(f"{_CHANGES}/names"):
-        return {}
     names = file.text_list(f"{_CHANGES}/names")
+    if not names:
+        return {}
     sizes = {"input": len(names), "r": file.array("/entry/radial_profile/r").size}
     read = read_record(records.KERNEL_CHANGES, file, _CHANGES, sizes=sizes)["kernel_changes"]
     return dict(zip(names, read, strict=True))
