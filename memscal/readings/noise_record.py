@@ -52,8 +52,7 @@ class NoiseRecord:
 
     def spectral_density(self, frequency: FloatArray) -> FloatArray:
         """One-sided spectral density in V^2/Hz at frequencies in Hz."""
-        slow = self._densities(np.asarray(frequency)) @ self.variances
-        return np.asarray(2 * self.step * self.white + slow)
+        return 2 * self.step * self.white + self._densities(frequency) @ self.variances
 
     @property
     def band(self) -> tuple[float, float]:
@@ -167,7 +166,7 @@ def _fitted(found: FloatArray, shapes: FloatArray, counts: IndexArray) -> tuple[
 
 def _means(values: FloatArray, edges: IndexArray, counts: IndexArray) -> FloatArray:
     """Return means along the last axis, of bins from edges."""
-    return np.asarray(np.add.reduceat(values, edges, axis=-1) / counts)
+    return np.add.reduceat(values, edges, axis=-1) / counts
 
 
 def record_messages(scan: Scan) -> Iterator[Message]:
