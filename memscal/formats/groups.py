@@ -12,7 +12,7 @@ import numpy as np
 from memscal.errors import FormatError, InputError, UnitError, placed
 from memscal.formats.hdf5 import writer
 from memscal.formats.hdf5.reader import SafeFile
-from memscal.formats.hdf5.writer import Attribute, Group, Node, Nodes, Number, si, to_json
+from memscal.formats.hdf5.writer import Attributes, Group, Node, Nodes, Number, si, to_json
 from memscal.formats.units import dimension_of, from_si, to_si
 from memscal.model import records
 from memscal.model.apparatus import ApparatusData, ParameterSet
@@ -107,7 +107,7 @@ def write_record(record: Record, stated: object, **others: Node) -> Group:
                 children.setdefault(value_of, si(quantity.of, quantity.dimension))
         elif value != "":
             children[quantity.key] = kind.write(quantity, value)
-    plot: dict[str, Attribute] = {"signal": record.signal, "axes": record.axes}
+    plot: Attributes = {"signal": record.signal, "axes": record.axes}
     return Group(record.nx_class, children | others, plot if record.signal else {})
 
 

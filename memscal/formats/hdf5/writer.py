@@ -37,7 +37,7 @@ DIGEST_ATTRIBUTE = "memscal_content_sha256"
 # The list of what was written: a reader can follow it without ever listing a group.
 CONTENTS_PATH = "/entry/contents/data"
 
-Attribute = str | int | Axes
+Attributes = Mapping[str, str | int | Axes]
 
 
 @array_record
@@ -47,7 +47,7 @@ class Number:
     values: NDArray[np.float64] | NDArray[np.int64]
     units: str
     axes: Axes = ()
-    attributes: Mapping[str, Attribute] = field(default_factory=dict)
+    attributes: Attributes = field(default_factory=dict)
 
 
 @array_record
@@ -55,7 +55,7 @@ class Text:
     """A string with attributes; one without is a plain ``str``."""
 
     value: str
-    attributes: Mapping[str, Attribute]
+    attributes: Attributes
 
 
 @array_record
@@ -64,7 +64,7 @@ class Group:
 
     nx_class: str
     children: Mapping[str, "Node"]
-    attributes: Mapping[str, Attribute] = field(default_factory=dict)
+    attributes: Attributes = field(default_factory=dict)
 
 
 Node = Group | Number | Text | str
