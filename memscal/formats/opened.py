@@ -30,21 +30,19 @@ def opened_scan(
 
     Its noise is that of a noise record, given in one of these ways, or else its own.
     """
-    if isinstance(scan, Scan):
-        opened = scan
-    elif isinstance(scan, str | PathLike):
+    if isinstance(scan, str | PathLike):
         with open_hdf5(scan, accept_altered=accept_altered) as file:
-            opened = scan_from(file, most)
-    else:
+            scan = scan_from(file, most)
+    if not isinstance(scan, Scan):
         raise InputError(
             f"{type(scan).__name__} is given where a Scan is needed.",
             cure="Give a scan, or the path of its file.",
         )
-    require_single(opened)
+    require_single(scan)
     if noise_record is not None:
         record = opened_scan(noise_record, accept_altered=accept_altered)
-        opened = replace(opened, noise_record=record)
-    return with_recorded_noise(opened)
+        scan = replace(scan, noise_record=record)
+    return with_recorded_noise(scan)
 
 
 def opened_scans(

@@ -26,7 +26,6 @@ _CHANNELS = ("u_xz", "u_xz_errors", "u_yz", "u_yz_errors")
 _DATA = "/entry/data"
 _SIGNAL = f"{_DATA}/u_zz"
 _NOISE = "/entry/noise_record"
-_SAMPLE = "/entry/sample"
 _DECLARED = by_name(records.SCAN_DATA.quantities)
 # The other arrays have the shape of the signal, which is that of the scan.
 _OWN_SHAPE = {"x", "y", "x_errors", "y_errors", "u_zz_correlation"}
@@ -116,7 +115,7 @@ def scan_from(file: SafeFile, most: int | None = None, schema: str = writer.SCAN
     reference = None
     if file.has("/entry/reference"):
         reference = groups.read_profile(file, load=load["load"])
-    contact = read_record(records.SAMPLE, file, _SAMPLE)
+    contact = read_record(records.SAMPLE, file, "/entry/sample")
     contact["lubrication"] = contact.get("lubrication", "").strip().lower()
     return Scan(
         x=arrays.pop(along),
