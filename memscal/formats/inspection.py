@@ -157,7 +157,7 @@ def _digest(file: SafeFile) -> Finding:
 
 
 def _schema(file: SafeFile) -> str:
-    schema = file.attribute("/", writer.SCHEMA_ATTRIBUTE)
+    schema = file.schema
     known = [*_READERS, *FILES]
     if schema in known:
         return str(schema)

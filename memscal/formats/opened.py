@@ -9,7 +9,7 @@ from memscal.errors import InputError, counted
 from memscal.extensions import hook
 from memscal.formats.files import FilePath
 from memscal.formats.hdf5.reader import open_hdf5
-from memscal.formats.hdf5.writer import SCHEMA_ATTRIBUTE, STRESS_SCHEMA
+from memscal.formats.hdf5.writer import STRESS_SCHEMA
 from memscal.formats.scan import scan_from
 from memscal.formats.stress import stress_from
 from memscal.model.measured_stress import MeasuredStress
@@ -69,7 +69,7 @@ def opened_contacts(
     for item in listed_items(contacts):
         if isinstance(item, str | PathLike):
             with open_hdf5(item, accept_altered=accept_altered) as file:
-                is_stress = file.attribute("/", SCHEMA_ATTRIBUTE) == STRESS_SCHEMA
+                is_stress = file.schema == STRESS_SCHEMA
                 item = stress_from(file) if is_stress else scan_from(file)
         if not isinstance(item, MeasuredStress):
             item = opened_scan(item, noise_record=noise_record)

@@ -14,7 +14,6 @@ from memscal.errors import InputError, placed
 from memscal.formats.digest import require_schema, require_unaltered
 from memscal.formats.files import FilePath, damage_named, read_bytes
 from memscal.formats.groups import profile_groups, read_field, read_profile
-from memscal.formats.hdf5 import writer
 from memscal.formats.hdf5.reader import SafeFile, open_hdf5
 from memscal.formats.hdf5.writer import REFERENCE_SCHEMA, Group, file_tree, write_tree
 from memscal.formats.units import to_si
@@ -167,7 +166,7 @@ def _image(data: bytes) -> NDArray[Any]:
 
 def profile_from(file: SafeFile) -> StressProfile:
     """Read the profile of an open memscal-reference file, or a field of another program."""
-    if file.attribute("/", writer.SCHEMA_ATTRIBUTE) is None:
+    if file.schema is None:
         require_unaltered(file)
         path = ""
         while isinstance(name := file.attribute(path or "/", "default"), str) and len(path) < 99:

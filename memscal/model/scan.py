@@ -598,7 +598,7 @@ class Scan:
                 "(--layout), board and range out.",
             )
         own: Values = {"sensors": names, "sensor": self.sensor, "u_zz": u_zz}
-        shapes: Values = {"u_zz_errors": u_zz.shape, **dict.fromkeys(OF_SENSORS, (number,))}
+        shapes = {"u_zz_errors": u_zz.shape, **dict.fromkeys(OF_SENSORS, (number,))}
         shapes |= {"layout": (number, 2), "layout_uncertainty": (number, 2)}
         for name, shape in shapes.items():
             own[name] = getattr(self, name)

@@ -21,6 +21,7 @@ from memscal.errors import FormatError, InputError, UnsafeFileError, placed
 from memscal.formats.files import FilePath, damage_named, read_bytes
 from memscal.formats.hdf5 import limits
 from memscal.formats.hdf5.limits import MAX_TEXT_BYTES, refuse
+from memscal.formats.hdf5.writer import SCHEMA_ATTRIBUTE
 from memscal.formats.units import dimension_of, to_si
 from memscal.model.arrays import FloatArray, Values
 from memscal.model.notation import printable
@@ -119,6 +120,11 @@ class SafeFile:
     def where(self, path: str) -> str:
         """Return file and path as messages name them."""
         return f"{self.name}: {path}"
+
+    @property
+    def schema(self) -> StoredAttribute:
+        """What the file says that it holds; nothing in most files of other programs."""
+        return self.attribute("/", SCHEMA_ATTRIBUTE)
 
     @property
     def verified(self) -> bool:
