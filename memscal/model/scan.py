@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import field, fields, replace
+from dataclasses import field, replace
 from functools import partial
 from types import MappingProxyType
 from typing import Any, Literal, NamedTuple, TypedDict, Unpack
@@ -452,7 +452,7 @@ class Scan:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle the fields, and prove them again: a read-only mapping cannot be pickled."""
-        values = {item.name: getattr(self, item.name) for item in fields(Scan)}
+        values = {name: getattr(self, name) for name in Scan.__dataclass_fields__}
         return partial(Scan, **{**values, "channels": dict(self.channels)}), ()
 
     def __repr__(self) -> str:
