@@ -11,6 +11,7 @@ import zipfile
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from importlib import import_module
+from os import PathLike
 from pathlib import PurePath
 from types import MappingProxyType
 from typing import Any
@@ -61,7 +62,7 @@ def open_table(
     With ``gaps`` rows below the head are readings though nothing stands in them.
     """
     reading = {name: value for name, value in reading.items() if value or value == 0}
-    path = isinstance(source, str) or hasattr(source, "__fspath__")
+    path = isinstance(source, str | PathLike)
     ending = PurePath(source).suffix.lower() if path else ""
     if ending in _OTHERS:
         problem = f"{source} is a workbook of a kind that is not read."
