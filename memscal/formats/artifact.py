@@ -37,7 +37,6 @@ def artifact_from(file: SafeFile) -> ApparatusData:
     require_schema(file, ARTIFACT_SCHEMA)
     require_unaltered(file)
     load = read_record(records.LOAD, file, "/entry/indenter", defaults={"load": None})["load"]
-    film, indenter = groups.read_stated(file)
     process = groups.read_process(file)
     u_zz = "/entry/reconvolution/u_zz"
     reading = reading_of(file.units_of(u_zz) or "V", file.where(u_zz))
@@ -55,8 +54,6 @@ def artifact_from(file: SafeFile) -> ApparatusData:
         parameters=groups.read_parameters(file, "/entry/parameters", reading),
         budget=groups.read_budget(file, "/entry/parameters/budget"),
         checks=groups.read_quality(file),
-        film=film,
-        indenter=indenter,
         **groups.read_circumstances(file),
         load=load,
         reference=groups.read_profile(file, load=load),
@@ -90,7 +87,7 @@ def artifact_tree(data: ApparatusData) -> Group:
         "instrument": groups.instrument_group(data),
         **groups.circumstances(data),
         "indenter": groups.indenter_group(data.indenter, data),
-        **groups.reference_groups(data.reference),
+        **groups.profile_groups(data.reference),
         "process": write_record(records.PROCESS, data.process),
     }
     if data.assumptions:
@@ -102,9 +99,13 @@ def artifact_tree(data: ApparatusData) -> Group:
         children["kernel_changes"] = _with_names(group, data.kernel_changes)
     if data.shared_effects:
         table = np.stack(list(data.shared_effects.values()))
-        changes = {"of_a": table[:, 0], "of_sigma": table[:, 1], "of_transfer": table[:, 2:]}
-        k = round_wavenumbers(data.resolved_wavenumber)
-        group = write_record(records.SHARED_EFFECTS, {"k": k, **changes})
+        effects = {
+            "k": round_wavenumbers(data.resolved_wavenumber),
+            "of_a": table[:, 0],
+            "of_sigma": table[:, 1],
+            "of_transfer": table[:, 2:],
+        }
+        group = write_record(records.SHARED_EFFECTS, effects)
         children["shared_effects"] = _with_names(group, data.shared_effects)
     if data.other is not None:
         name = "bayesian" if data.other.method == "bayesian" else "division"
@@ -136,9 +137,9 @@ def _read_effects(file: SafeFile) -> Arrays:
 
 
 def _read_changes(file: SafeFile) -> Arrays:
-    if not file.has(f"{_CHANGES}/names"):
-        return {}
     names = file.text_list(f"{_CHANGES}/names")
+    if not names:
+        return {}
     sizes = {"input": len(names), "r": file.array("/entry/radial_profile/r").size}
     read = read_record(records.KERNEL_CHANGES, file, _CHANGES, sizes=sizes)["kernel_changes"]
     return dict(zip(names, read, strict=True))

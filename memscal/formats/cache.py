@@ -8,17 +8,15 @@ import hashlib
 import json
 import os
 import re
-from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
 
 from memscal.errors import MemscalError, OutputError
 from memscal.formats.digest import require_schema, require_unaltered
 from memscal.formats.files import FilePath, atomic_write_bytes
 from memscal.formats.hdf5.reader import open_hdf5
 from memscal.formats.hdf5.writer import Group, Nodes, Number, file_tree, tree_to_bytes
-from memscal.model.arrays import Arrays
+from memscal.model.arrays import Arrays, Values
 
 CONTACT_TABLE_SCHEMA = "memscal-contact-table"
 
@@ -41,7 +39,7 @@ _OTHERS = {
 }
 
 
-def table_key(content: Mapping[str, Any]) -> str:
+def table_key(content: Values) -> str:
     """Return the SHA-256 of what a table depends on, in plain values for JSON."""
     text = json.dumps(content, sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(text.encode("utf-8")).hexdigest()
@@ -50,7 +48,7 @@ def table_key(content: Mapping[str, Any]) -> str:
 def keep_contact_table(folder: FilePath, key: str, arrays: Arrays) -> None:
     """Write arrays under their key, remove the oldest; where the disk takes none, keep none."""
     # value (M,), load (L,), k (K,), transforms (M, L, K) in N, all others (M, L).
-    children: Nodes = {
+    children = {
         name: Number(array, *_OTHERS.get(name, _TRANSFORM)) for name, array in arrays.items()
     }
     contacts = Group("NXdata", children, {"signal": "spectra", "axes": _TRANSFORM[1]})

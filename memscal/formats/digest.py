@@ -12,7 +12,7 @@ from memscal.model.arrays import Values
 
 def require_schema(file: SafeFile, schema: str) -> str:
     """Return the schema version; refuse another schema or a newer major version."""
-    stored = file.attribute("/", writer.SCHEMA_ATTRIBUTE)
+    stored = file.schema
     if stored != schema:
         held = "no memscal schema" if stored is None else f'the schema "{stored}"'
         cure = "Give the right file, or make one with `memscal import` or `memscal calibrate`."
@@ -53,8 +53,7 @@ _PATH = re.compile(r"/|(?:/[a-z][a-z0-9_]*)+")
 
 def has_no_digest(file: SafeFile) -> bool:
     """Return whether a file has no digest and needs none: other programs write such, too."""
-    schema = file.attribute("/", writer.SCHEMA_ATTRIBUTE)
-    needs_none = schema in (writer.SCAN_SCHEMA, writer.REFERENCE_SCHEMA, None)
+    needs_none = file.schema in (writer.SCAN_SCHEMA, writer.REFERENCE_SCHEMA, None)
     return needs_none and file.attribute("/", writer.DIGEST_ATTRIBUTE) is None
 
 

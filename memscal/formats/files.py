@@ -1,18 +1,18 @@
 """Bytes of files: written whole or not at all, never over an input; read within a limit."""
 
 import errno
+import fcntl
 import os
 import re
 import secrets
 import stat
 import time
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
 from contextvars import ContextVar
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, Self
 
 from memscal.errors import FormatError, InputError, MemscalError, OutputError, UnsafeFileError
 from memscal.model.notation import printable
@@ -23,12 +23,6 @@ FilePath = str | os.PathLike[str]
 
 HDF5_SUFFIXES = (".h5", ".hdf5", ".hdf", ".nxs", ".nx5")
 """Endings of HDF5 files."""
-
-fcntl: Any
-try:
-    import fcntl
-except ImportError:  # on Windows, which has no locks of this kind
-    fcntl = None
 
 _UNTOUCHED = "Nothing was written; what was there before is untouched."
 _CURES = {
@@ -83,44 +77,28 @@ def together(folder: FilePath | None = None) -> Iterator[None]:
 
 @dataclass
 class _File:
-    """A file on its way to its target, with its locks; ``before`` is a name of what it replaces."""
+    """A file on its way to its target; ``before`` is a name of what it replaces."""
 
     target: Path
     overwrite: bool
     temporary: Path
-    descriptors: list[int] = field(default_factory=list)
     before: Path | None = None
     replaces: bool = False
     placed: bool = False
 
 
-class _Transaction:
+class _Transaction(ExitStack):
     """Files that are written and flushed beside their targets, and then renamed."""
 
     def __init__(self) -> None:
+        super().__init__()
         self._files: list[_File] = []
-        self._made: Path | None = None
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        for file in self._files:
-            for temporary in (file.temporary, file.before):
-                with suppress(OSError):
-                    if temporary is not None:
-                        os.unlink(temporary)
-            for descriptor in file.descriptors:
-                os.close(descriptor)
-        if self._made is not None:
-            with suppress(OSError):
-                self._made.rmdir()  # takes nothing from one that holds the files
 
     def make(self, folder: Path) -> None:
         """Make a folder for the files; one that is there stays."""
         with _blamed(folder), suppress(FileExistsError):
             folder.mkdir()
-            self._made = folder
+            self.callback(_removed, folder.rmdir)  # takes nothing from one that holds the files
 
     def write(self, target: Path, data: bytes | memoryview, overwrite: bool) -> None:
         """Write and flush a file beside its target; it keeps the permissions of the old one."""
@@ -131,7 +109,16 @@ class _Transaction:
             mode = None
             with suppress(FileNotFoundError):
                 mode = stat.S_IMODE(os.stat(target).st_mode)
-            file.descriptors += _write_durably(file.temporary, data, mode)
+            flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW
+            # The umask sets the mode of a new one.
+            descriptor = os.open(file.temporary, flags, 0o666 if mode is None else 0o600)
+            self._lock(descriptor, file.temporary)
+            remaining = memoryview(data)
+            while remaining:
+                remaining = remaining[os.write(descriptor, remaining) :]
+            if mode is not None:
+                os.chmod(file.temporary, mode)
+            os.fsync(descriptor)
 
     def commit(self) -> None:
         """Rename all files; where one of them cannot be, give the others back what was there."""
@@ -161,10 +148,16 @@ class _Transaction:
     def _keep(self, file: _File) -> None:
         """Give what is there a second name, locked; a disk without hard links has no way back."""
         with suppress(OSError):
-            if fcntl is not None:
-                file.descriptors += _locked(os.open(file.target, os.O_RDONLY))
             file.before = _beside(file.target)
+            self._lock(os.open(file.target, os.O_RDONLY), file.before)
             os.link(file.target, file.before)
+
+    def _lock(self, descriptor: int, temporary: Path) -> None:
+        """Lock an open file, where the disk has locks, until its temporary name goes at the end."""
+        self.callback(os.close, descriptor)
+        self.callback(_removed, temporary.unlink)
+        with suppress(OSError):
+            fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
 
 
 _OPEN: ContextVar[_Transaction] = ContextVar("the files that are written together")
@@ -237,38 +230,10 @@ def _blamed(target: Path) -> Iterator[None]:
         raise OutputError(problem, why=_UNTOUCHED, cure=cure) from error
 
 
-def _flags(*names: str) -> int:
-    """Return those flags of a file that the system has."""
-    return sum(getattr(os, f"O_{name}", 0) for name in names)
-
-
-def _write_durably(temporary: Path, data: bytes | memoryview, mode: int | None) -> list[int]:
-    """Write and flush to the disk; return what locks the file. The umask sets a new one's mode."""
-    flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | _flags("CLOEXEC", "NOFOLLOW", "BINARY")
-    descriptor = os.open(temporary, flags, 0o666 if mode is None else 0o600)
-    try:
-        locks = _locked(descriptor)
-        remaining = memoryview(data)
-        while remaining:
-            remaining = remaining[os.write(descriptor, remaining) :]
-        if mode is not None:
-            os.chmod(temporary, mode)
-        os.fsync(descriptor)
-    except BaseException:
-        os.close(descriptor)
-        raise
-    if not locks:
-        os.close(descriptor)
-    return locks
-
-
-def _locked(descriptor: int) -> list[int]:
-    """Lock an open file for as long as this process lives; where there are locks, return it."""
-    if fcntl is None:
-        return []
+def _removed(remove: Callable[[], None]) -> None:
+    """Remove what is left of a file or folder, if anything is."""
     with suppress(OSError):
-        fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
-    return [descriptor]
+        remove()
 
 
 #: Seconds after which a temporary file without a lock is that of a process that was killed.
@@ -279,8 +244,6 @@ _TEMPORARY = re.compile(r"\.memscal-[0-9a-f]{16}\.tmp")
 @lru_cache(maxsize=4096)
 def _remove_orphans(folder: Path) -> None:
     """Remove from a folder, once in a process, what killed processes left of their outputs."""
-    if fcntl is None:
-        return
     with suppress(OSError), os.scandir(folder) as items:
         left = [item.path for item in items if _TEMPORARY.fullmatch(item.name)]
         for path in left:
@@ -289,7 +252,7 @@ def _remove_orphans(folder: Path) -> None:
 
 
 def _remove_orphan(path: str) -> None:
-    descriptor = os.open(path, os.O_RDWR | _flags("NOFOLLOW", "NONBLOCK", "CLOEXEC"))
+    descriptor = os.open(path, os.O_RDWR | os.O_NOFOLLOW | os.O_NONBLOCK)
     try:
         status = os.fstat(descriptor)
         if stat.S_ISREG(status.st_mode) and time.time() - status.st_mtime > _ORPHANED:
@@ -312,7 +275,7 @@ def _place_new(temporary: Path, target: Path) -> None:
 def _sync_folder(folder: Path) -> None:
     """Make the new name durable; some systems cannot, and the content is safe without it."""
     with suppress(OSError):
-        descriptor = os.open(folder, os.O_RDONLY | _flags("DIRECTORY"))
+        descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
         try:
             os.fsync(descriptor)
         finally:
@@ -328,7 +291,7 @@ def read_pieces(path: FilePath, *, limit: int) -> Iterator[bytes]:
     """Yield the same in pieces of up to 1 MiB; a file that grows meanwhile meets the limit, too."""
     shown = os.fspath(path)
     try:
-        descriptor = os.open(shown, os.O_RDONLY | _flags("NONBLOCK", "CLOEXEC", "NOCTTY", "BINARY"))
+        descriptor = os.open(shown, os.O_RDONLY | os.O_NONBLOCK | os.O_NOCTTY)
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise InputError(

@@ -12,13 +12,13 @@ import numpy as np
 from memscal.errors import FormatError, InputError, UnitError, placed
 from memscal.formats.hdf5 import writer
 from memscal.formats.hdf5.reader import SafeFile
-from memscal.formats.hdf5.writer import Attribute, Group, Node, Nodes, Number, si, to_json
+from memscal.formats.hdf5.writer import Attributes, Group, Node, Nodes, Number, si, to_json
 from memscal.formats.units import dimension_of, from_si, to_si
 from memscal.model import records
 from memscal.model.apparatus import ApparatusData, ParameterSet
 from memscal.model.arrays import Values, value_record
 from memscal.model.assumptions import Assumption
-from memscal.model.checks import QualityCheck, messages_from_json
+from memscal.model.checks import QualityCheck, QualityChecks, messages_from_json
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Cone, Indenter, Profile, Rod, RoundIndenter, Sphere
 from memscal.model.instrument import Dynamics, Equipment, LoadCell, StressSensor, User
@@ -38,6 +38,9 @@ from memscal.model.stress import IdealReference, StressField, StressProfile
 
 _NOTHING: Mapping[str, Any] = MappingProxyType({})
 _MeasuredOn = Scan | ApparatusData | MeasuredScan
+
+Budget = Mapping[str, Mapping[str, float]]
+"""Standard uncertainties by source, of each quantity."""
 
 
 @value_record
@@ -104,7 +107,7 @@ def write_record(record: Record, stated: object, **others: Node) -> Group:
                 children.setdefault(value_of, si(quantity.of, quantity.dimension))
         elif value != "":
             children[quantity.key] = kind.write(quantity, value)
-    plot: dict[str, Attribute] = {"signal": record.signal, "axes": record.axes}
+    plot: Attributes = {"signal": record.signal, "axes": record.axes}
     return Group(record.nx_class, children | others, plot if record.signal else {})
 
 
@@ -160,7 +163,7 @@ def _read(file: SafeFile, at: str, quantity: Quantity, lengths: dict[str, int]) 
 def origins(file: SafeFile, paths: Iterable[tuple[str, Quantity]]) -> Values:
     """Return the origin of a file as its quantities state it, by their names; JSON notes last."""
     texts: Values = {}
-    notes: Values = {}
+    notes = {}
     for at, quantity in paths:
         value = KINDS[quantity.dimension].read(file, at)
         name = quantity.origin
@@ -198,7 +201,7 @@ def parameter_dimension(name: str, unit: str = "", reading: Reading = VOLTS) -> 
     )
 
 
-def parameter_group(parameters: ParameterSet, budget: Mapping[str, Mapping[str, float]]) -> Group:
+def parameter_group(parameters: ParameterSet, budget: Budget) -> Group:
     """Return the parameters as an NXcollection."""
     stated = parameters.units or ("",) * len(parameters.names)
     dimensions = {
@@ -265,7 +268,7 @@ def named_collection(children: Mapping[str, Node]) -> Group:
     return Group("NXcollection", {"names": to_json(list(children)), **children})
 
 
-def budget_group(budget: Mapping[str, Mapping[str, float]], dimensions: Mapping[str, str]) -> Group:
+def budget_group(budget: Budget, dimensions: Mapping[str, str]) -> Group:
     """Return the uncertainty budget: one group per quantity, one number per source."""
     children = {}
     for quantity, sources in budget.items():
@@ -275,7 +278,7 @@ def budget_group(budget: Mapping[str, Mapping[str, float]], dimensions: Mapping[
     return named_collection(children)
 
 
-def read_budget(file: SafeFile, path: str) -> dict[str, dict[str, float]]:
+def read_budget(file: SafeFile, path: str) -> Budget:
     """Read the uncertainty budget, in SI units; empty where there is none."""
     budget = {}
     for quantity in file.text_list(f"{path}/names"):
@@ -294,26 +297,17 @@ def read_film(file: SafeFile, path: str) -> ElasticFilm:
         return ElasticFilm(**read_record(records.FILM, file, path))
 
 
-def read_stated(file: SafeFile) -> tuple[ElasticFilm | None, RoundIndenter | None]:
-    """Read the film and the indenter of a scan or an artifact, where it states them."""
-    film = "/entry/sample/film"
-    indenter = "/entry/indenter"
-    stated = any(file.has(f"{indenter}/{name}") for name in ("shape", "radius"))
-    rod_or_sphere = read_round_indenter(file, indenter) if stated else None
-    return read_film(file, film) if file.has(film) else None, rod_or_sphere
-
-
 #: NeXus has samples and sensors say what moves them: nothing here, the indenter moves.
 _NOWHERE = {"depends_on": "."}
 
 
 def sample_group(of: _MeasuredOn) -> Group:
     """Return the NXsample that holds the film, and how it was lubricated."""
-    children = {}
+    children: Nodes = {}
     if of.film is not None:
         children["film"] = write_record(records.FILM, of.film)
-    sample = write_record(records.SAMPLE, of)
-    return Group("NXsample", {**children, **sample.children, **_NOWHERE})
+    children |= write_record(records.SAMPLE, of).children
+    return Group("NXsample", children | _NOWHERE)
 
 
 def indenter_group(indenter: Indenter | None, of: object = _NOTHING) -> Group:
@@ -356,7 +350,7 @@ def _shape(file: SafeFile, path: str) -> str:
 
 def instrument_group(of: _MeasuredOn) -> Group:
     """Return the NXinstrument that holds the sensor, and load cell and stage if they are stated."""
-    dynamics: Nodes = {}
+    dynamics = {}
     if of.sensor.dynamics is not None:
         dynamics["dynamics"] = write_record(records.DYNAMICS, of.sensor.dynamics)
     parts = {"stress_sensor": write_record(records.SENSOR, of.sensor, **dynamics, **_NOWHERE)}
@@ -386,23 +380,31 @@ def read_instrument(file: SafeFile, path: str = "/entry") -> Values:
 
 def circumstances(of: Scan | ApparatusData) -> Nodes:
     """Return when and by whom a scan was made, for the entry of a scan or an artifact."""
-    user = write_record(records.USER, of.user)
-    stated = {"user": user} if user.children else {}
-    return {**write_record(records.TIMES, of).children, **stated}
+    entry = dict(write_record(records.TIMES, of).children)
+    if of.user != User():
+        entry["user"] = write_record(records.USER, of.user)
+    return entry
 
 
 def read_circumstances(file: SafeFile) -> Values:
-    """Read when, by whom and with which instruments a scan was made."""
-    user = read_record(records.USER, file, "/entry/user")
-    times = read_record(records.TIMES, file, "/entry")
-    return {**read_instrument(file), "user": User(**user), **times}
+    """Read what was pressed on what, where it is stated, when, by whom, and with what."""
+    film = "/entry/sample/film"
+    indenter = "/entry/indenter"
+    stated = any(file.has(f"{indenter}/{name}") for name in ("shape", "radius"))
+    return {
+        "film": read_film(file, film) if file.has(film) else None,
+        "indenter": read_round_indenter(file, indenter) if stated else None,
+        **read_instrument(file),
+        "user": User(**read_record(records.USER, file, "/entry/user")),
+        **read_record(records.TIMES, file, "/entry"),
+    }
 
 
-def profile_groups(profile: StressProfile) -> tuple[Group, Group, Group]:
+def profile_groups(profile: StressProfile, prefix: str = "reference_") -> Nodes:
     """Return a stress profile as NXdata, its parameters, and how it was calculated."""
     film = profile.film
     indenter = profile.indenter
-    contact: Nodes = {}
+    contact = {}
     if film:
         contact["film"] = write_record(records.FILM, film)
     if indenter:
@@ -411,8 +413,11 @@ def profile_groups(profile: StressProfile) -> tuple[Group, Group, Group]:
     solution: Nodes = {"numerics": numerics} if numerics.children else {}
     solution |= write_record(records.PROFILE_NOTES, profile).children
     data = write_record(records.PROFILE, profile) if profile.form is None else _form(profile.form)
-    parameters = write_record(records.CONTACT, profile, **contact)
-    return data, parameters, write_record(records.SOLVER, profile, **solution)
+    return {
+        "reference": data,
+        f"{prefix}parameters": write_record(records.CONTACT, profile, **contact),
+        f"{prefix}process": write_record(records.SOLVER, profile, **solution),
+    }
 
 
 def _form(form: IdealReference | StressField) -> Group:
@@ -448,12 +453,6 @@ def read_field(file: SafeFile, path: str) -> StressField:
         return StressField(
             x=along_x, y=along_y, values=values, unit=unit, load=load, source=file.source
         )
-
-
-def reference_groups(profile: StressProfile) -> Nodes:
-    """Return the groups of a stress profile within the entry of a scan or an artifact."""
-    names = ("reference", "reference_parameters", "reference_process")
-    return dict(zip(names, profile_groups(profile), strict=True))
 
 
 def read_profile(
@@ -511,7 +510,7 @@ def read_assumptions(file: SafeFile) -> tuple[Assumption, ...]:
     return tuple(assumptions)
 
 
-def quality_group(checks: tuple[QualityCheck, ...]) -> Group:
+def quality_group(checks: QualityChecks) -> Group:
     """Return the quality checks, one NXcollection each."""
     children = {}
     for check in checks:
@@ -522,7 +521,7 @@ def quality_group(checks: tuple[QualityCheck, ...]) -> Group:
     return named_collection(children)
 
 
-def read_quality(file: SafeFile) -> tuple[QualityCheck, ...]:
+def read_quality(file: SafeFile) -> QualityChecks:
     """Read the quality checks, in their order."""
     checks = []
     for name in file.text_list("/entry/quality/names"):

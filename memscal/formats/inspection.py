@@ -125,7 +125,7 @@ def describe(path: FilePath, *, accept_altered: bool = False) -> Values:
 
 def check(path: FilePath) -> list[Finding]:
     """Check a file step by step (safety, schema, digest, content) up to the first that fails."""
-    findings: list[Finding] = []
+    findings = []
     step = "safety"
     try:
         with open_hdf5(path) as file:
@@ -157,7 +157,7 @@ def _digest(file: SafeFile) -> Finding:
 
 
 def _schema(file: SafeFile) -> str:
-    schema = file.attribute("/", writer.SCHEMA_ATTRIBUTE)
+    schema = file.schema
     known = [*_READERS, *FILES]
     if schema in known:
         return str(schema)

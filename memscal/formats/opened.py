@@ -9,7 +9,7 @@ from memscal.errors import InputError, counted
 from memscal.extensions import hook
 from memscal.formats.files import FilePath
 from memscal.formats.hdf5.reader import open_hdf5
-from memscal.formats.hdf5.writer import SCHEMA_ATTRIBUTE, STRESS_SCHEMA
+from memscal.formats.hdf5.writer import STRESS_SCHEMA
 from memscal.formats.scan import scan_from
 from memscal.formats.stress import stress_from
 from memscal.model.measured_stress import MeasuredStress
@@ -30,21 +30,19 @@ def opened_scan(
 
     Its noise is that of a noise record, given in one of these ways, or else its own.
     """
-    if isinstance(scan, Scan):
-        opened = scan
-    elif isinstance(scan, str | PathLike):
+    if isinstance(scan, str | PathLike):
         with open_hdf5(scan, accept_altered=accept_altered) as file:
-            opened = scan_from(file, most)
-    else:
+            scan = scan_from(file, most)
+    if not isinstance(scan, Scan):
         raise InputError(
             f"{type(scan).__name__} is given where a Scan is needed.",
             cure="Give a scan, or the path of its file.",
         )
-    require_single(opened)
+    require_single(scan)
     if noise_record is not None:
         record = opened_scan(noise_record, accept_altered=accept_altered)
-        opened = replace(opened, noise_record=record)
-    return with_recorded_noise(opened)
+        scan = replace(scan, noise_record=record)
+    return with_recorded_noise(scan)
 
 
 def opened_scans(
@@ -55,9 +53,10 @@ def opened_scans(
     noise_record: Any = None,
 ) -> tuple[Scan, ...]:
     """Return scans that are given themselves or as paths, at least one; of ``most`` points each."""
-    listed = listed_items(scans)
-    stated = {"accept_altered": accept_altered, "noise_record": noise_record}
-    opened = [opened_scan(scan, most, **stated) for scan in listed]
+    opened = [
+        opened_scan(scan, most, accept_altered=accept_altered, noise_record=noise_record)
+        for scan in listed_items(scans)
+    ]
     require_different(map(contents_of, opened))
     return tuple(opened)
 
@@ -68,15 +67,13 @@ def opened_contacts(
     """Return scans and measured stresses that are given themselves or as paths, at least one."""
     opened: list[Scan | MeasuredStress] = []
     for item in listed_items(contacts):
-        if isinstance(item, MeasuredStress):
-            opened.append(item)
-        elif isinstance(item, str | PathLike):
+        if isinstance(item, str | PathLike):
             with open_hdf5(item, accept_altered=accept_altered) as file:
-                is_stress = file.attribute("/", SCHEMA_ATTRIBUTE) == STRESS_SCHEMA
-                read = stress_from(file) if is_stress else scan_from(file)
-            opened.append(read if is_stress else opened_scan(read, noise_record=noise_record))
-        else:
-            opened.append(opened_scan(item, noise_record=noise_record))
+                is_stress = file.schema == STRESS_SCHEMA
+                item = stress_from(file) if is_stress else scan_from(file)
+        if not isinstance(item, MeasuredStress):
+            item = opened_scan(item, noise_record=noise_record)
+        opened.append(item)
     if noise_record is not None and not all(isinstance(item, Scan) for item in opened):
         raise InputError(
             "A noise record and measured stress are given.",

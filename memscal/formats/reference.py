@@ -4,6 +4,7 @@ import hashlib
 import os
 import re
 from io import BytesIO
+from pathlib import PurePath
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,6 @@ from memscal.errors import InputError, placed
 from memscal.formats.digest import require_schema, require_unaltered
 from memscal.formats.files import FilePath, damage_named, read_bytes
 from memscal.formats.groups import profile_groups, read_field, read_profile
-from memscal.formats.hdf5 import writer
 from memscal.formats.hdf5.reader import SafeFile, open_hdf5
 from memscal.formats.hdf5.writer import REFERENCE_SCHEMA, Group, file_tree, write_tree
 from memscal.formats.units import to_si
@@ -121,7 +121,7 @@ def length(text: str, what: str) -> float:
 def _read_pixels(path: FilePath, pixel_size: float | None) -> StressField:
     """Read a field from a 2-D array or an image."""
     data = read_bytes(path)
-    name = os.path.basename(os.fspath(path))
+    name = PurePath(path).name
     if pixel_size is None:
         raise InputError(
             f"The size of the pixels of {name} is not given.",
@@ -166,7 +166,7 @@ def _image(data: bytes) -> NDArray[Any]:
 
 def profile_from(file: SafeFile) -> StressProfile:
     """Read the profile of an open memscal-reference file, or a field of another program."""
-    if file.attribute("/", writer.SCHEMA_ATTRIBUTE) is None:
+    if file.schema is None:
         require_unaltered(file)
         path = ""
         while isinstance(name := file.attribute(path or "/", "default"), str) and len(path) < 99:
@@ -204,7 +204,5 @@ def write_reference(profile: StressProfile, path: FilePath, *, overwrite: bool =
     ...     read_reference(f"{folder}/rod.h5").load
     1.0
     """
-    data, parameters, process = profile_groups(profile)
-    stored = {"reference": data, "parameters": parameters, "process": process}
-    entry = Group("NXentry", stored, {"default": "reference"})
+    entry = Group("NXentry", profile_groups(profile, prefix=""), {"default": "reference"})
     write_tree(file_tree(REFERENCE_SCHEMA, entry), path, overwrite=overwrite)

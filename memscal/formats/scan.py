@@ -15,7 +15,7 @@ from memscal.formats.hdf5.reader import SafeFile, open_hdf5
 from memscal.formats.hdf5.writer import Group, Nodes, si
 from memscal.formats.units import reading_of
 from memscal.model import records
-from memscal.model.arrays import FloatArray, Values
+from memscal.model.arrays import Axes, FloatArray, Values
 from memscal.model.notation import Reading
 from memscal.model.quantities import by_name
 from memscal.model.scan import BRANCHES, LIKE_SIGNAL, Scan, branch_numbers, require_rod_friction
@@ -26,7 +26,6 @@ _CHANNELS = ("u_xz", "u_xz_errors", "u_yz", "u_yz_errors")
 _DATA = "/entry/data"
 _SIGNAL = f"{_DATA}/u_zz"
 _NOISE = "/entry/noise_record"
-_SAMPLE = "/entry/sample"
 _DECLARED = by_name(records.SCAN_DATA.quantities)
 # The other arrays have the shape of the signal, which is that of the scan.
 _OWN_SHAPE = {"x", "y", "x_errors", "y_errors", "u_zz_correlation"}
@@ -91,17 +90,15 @@ def scan_from(file: SafeFile, most: int | None = None, schema: str = writer.SCAN
     load = read_record(records.LOAD, file, "/entry/indenter", defaults={"load": None})
     with placed(file.where("/entry/indenter/friction_coefficient")):
         require_rod_friction(load.get("rod_friction"))
-    film, indenter = groups.read_stated(file)
+    stated = groups.read_circumstances(file)
+    stated["title"] = file.optional_text("/entry/title")
+    stated["notes"] = file.optional_text("/entry/notes/data")
     reading = reading_of(file.units_of(_SIGNAL) or "V", file.where(_SIGNAL))
     if file.attribute(_DATA, "axes") in ("time", ("time",)):
         # Under an indenter it is a dwell record, else a noise record.
         return Scan(
             **(load | _read_rest(file, _DATA, reading)),
-            indenter=indenter,
-            film=film,
-            **groups.read_circumstances(file),
-            title=file.optional_text("/entry/title"),
-            notes=file.optional_text("/entry/notes/data"),
+            **stated,
             source=file.source,
         )
     axes = _find_axes(file)
@@ -118,7 +115,7 @@ def scan_from(file: SafeFile, most: int | None = None, schema: str = writer.SCAN
     reference = None
     if file.has("/entry/reference"):
         reference = groups.read_profile(file, load=load["load"])
-    contact = read_record(records.SAMPLE, file, _SAMPLE)
+    contact = read_record(records.SAMPLE, file, "/entry/sample")
     contact["lubrication"] = contact.get("lubrication", "").strip().lower()
     return Scan(
         x=arrays.pop(along),
@@ -129,13 +126,9 @@ def scan_from(file: SafeFile, most: int | None = None, schema: str = writer.SCAN
         channels={name: arrays.pop(name) for name in _CHANNELS if name in arrays},
         **arrays,
         **load,
-        indenter=indenter,
-        film=film,
         unit=reading.si,
         **contact,
-        **groups.read_circumstances(file),
-        title=file.optional_text("/entry/title"),
-        notes=file.optional_text("/entry/notes/data"),
+        **stated,
         reference=reference,
         noise_record=_read_record(file),
         synthetic=_read_synthetic(file),
@@ -226,7 +219,7 @@ def scan_entry(scan: Scan) -> Group:
     if scan.notes:
         children["notes"] = writer.note(scan.notes)
     if scan.reference is not None:
-        children |= groups.reference_groups(scan.reference)
+        children |= groups.profile_groups(scan.reference)
     if scan.synthetic is not None:
         children["synthetic"] = _synthetic_group(scan.synthetic)
     return Group("NXentry", children, {"default": "data"})
@@ -274,7 +267,7 @@ def _rest_group(record: Scan) -> Group:
     return Group("NXdata", data, {"signal": "u_zz", "axes": ("time",)})
 
 
-def _nodes(scan: Scan, axes: tuple[str, ...], **arrays: FloatArray | None) -> Nodes:
+def _nodes(scan: Scan, axes: Axes, **arrays: FloatArray | None) -> Nodes:
     """Return arrays along some axes; those with one more run along the sensors, too."""
     return {
         _DECLARED[name].key: si(
@@ -287,7 +280,7 @@ def _nodes(scan: Scan, axes: tuple[str, ...], **arrays: FloatArray | None) -> No
     }
 
 
-def _find_axes(file: SafeFile) -> tuple[str, ...] | None:
+def _find_axes(file: SafeFile) -> Axes | None:
     """Return the axes of the readings as they are stored; none where the shape alone tells them."""
     shape = file.array(_SIGNAL).shape if file.has(_SIGNAL) else ()
     several = file.has(f"{_DATA}/sensor_names")

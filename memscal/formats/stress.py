@@ -170,13 +170,13 @@ def profile_paths(file: SafeFile) -> list[str]:
 
 
 def _entry(measured: MeasuredStress) -> Group:
-    profiles: Nodes = {}
+    profiles = {}
     for i, profile in enumerate(measured.profiles, 1):
         profiles[f"profile_{i}"] = _profile_group(profile, measured.scans)
-    scans: Nodes = {}
+    scans = {}
     sources = {"artifact": measured.artifact}
     for i, scan in enumerate(measured.scans, 1):
-        parts: Nodes = {
+        parts = {
             "sample": groups.sample_group(scan),
             "indenter": groups.indenter_group(scan.indenter, scan),
             "instrument": groups.instrument_group(scan),
@@ -184,7 +184,7 @@ def _entry(measured: MeasuredStress) -> Group:
         }
         scans[f"scan_{i}"] = Group("NXcollection", parts)
         sources[f"scan_{i}"] = scan.source
-    inputs: Nodes = {name: write_source(s) for name, s in sources.items() if s}
+    inputs = {name: write_source(s) for name, s in sources.items() if s}
     # Of the first scan; each states its own beside it, with its lubrication and stage.
     first = replace(measured.scans[0], lubrication="", stage=Equipment())
     sensor = first.sensor.name

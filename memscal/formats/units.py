@@ -16,9 +16,6 @@ from memscal.model.arrays import FloatArray, floats
 from memscal.model.notation import NAMED_UNITS, Reading
 from memscal.model.quantities import DIMENSIONS
 
-SI_UNITS = {name: dimension.si for name, dimension in DIMENSIONS.items()}
-"""The unit of each dimension inside Python."""
-
 #: Words for readings in a unit of their own.
 ARBITRARY = (
     "a.u.",
@@ -52,8 +49,8 @@ _POWERS = {
     "dimensionless": dict.fromkeys(("", *ARBITRARY), 0),
 }
 _CANONICAL: dict[str, tuple[str, int]] = {}
-for _dimension, _si in SI_UNITS.items():
-    _units = {_si: 0, **_POWERS.get(_dimension, {})}
+for _dimension, _of in DIMENSIONS.items():
+    _units = {_of.si: 0, **_POWERS.get(_dimension, {})}
     _CANONICAL |= {unit: (_dimension, power) for unit, power in _units.items()}
 
 # What pint may be asked: names, products and small powers.  Arithmetic such as 9**9**9 is a
@@ -140,7 +137,7 @@ def same_unit(first: str, second: str) -> bool:
     """Whether two units are the same one, however they are written."""
     known = [_CANONICAL.get(unit.strip()) for unit in (first, second)]
     if None not in known:
-        return len({(SI_UNITS[of], power) for of, power in filter(None, known)}) == 1
+        return len({(DIMENSIONS[of].si, power) for of, power in filter(None, known)}) == 1
     try:
         one, other = (_pint_quantity(unit, "unit", "") for unit in (first, second))
     except UnitError:

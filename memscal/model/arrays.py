@@ -23,13 +23,17 @@ Columns = dict[str, NDArray[Any]]
 Values = dict[str, Any]
 """Arrays, and any values, by their names."""
 
+Axes = tuple[str, ...]
+"""Names of the axes of an array."""
+
 _Class = TypeVar("_Class")
 
 
 @dataclass_transform(frozen_default=True, eq_default=False, field_specifiers=(field,))
 def array_record(cls: type[_Class]) -> type[_Class]:
     """Make a class a frozen dataclass that equals itself alone: arrays have no single truth."""
-    return dataclass(frozen=True, eq=False, repr=_shows_fields(cls))(cls)
+    # It shows its fields where neither it nor a base says how it is shown.
+    return dataclass(frozen=True, eq=False, repr=cls.__repr__ is object.__repr__)(cls)
 
 
 @dataclass_transform(
@@ -37,7 +41,7 @@ def array_record(cls: type[_Class]) -> type[_Class]:
 )
 def keyword_array_record(cls: type[_Class]) -> type[_Class]:
     """Make a class a record of arrays whose fields are given by their names."""
-    return dataclass(frozen=True, kw_only=True, eq=False, repr=_shows_fields(cls))(cls)
+    return dataclass(frozen=True, kw_only=True, eq=False, repr=cls.__repr__ is object.__repr__)(cls)
 
 
 @dataclass_transform(frozen_default=True, field_specifiers=(field,))
@@ -50,11 +54,6 @@ def value_record(cls: type[_Class]) -> type[_Class]:
 def keyword_value_record(cls: type[_Class]) -> type[_Class]:
     """Make a class a record of values whose fields are given by their names."""
     return dataclass(frozen=True, kw_only=True)(cls)
-
-
-def _shows_fields(cls: type) -> bool:
-    """Whether neither a class nor its bases say how it is shown."""
-    return not any("__repr__" in vars(base) for base in cls.__mro__[:-1])
 
 
 #: In place of zero where a divisor or a logarithm must not be that.

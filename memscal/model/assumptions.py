@@ -1,8 +1,9 @@
 """What a calibration takes for granted, with the sizes at which that would matter."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import field
+
+from memscal.model.arrays import Values, value_record
 
 #: Whether a size is taken for granted, stated with an uncertainty that is counted, or measured.
 ASSUMED = "assumed"
@@ -63,7 +64,7 @@ LENGTHS = ("line_offset", "shear_sensitivity", "thickness")
 NAMES = tuple(_KNOWN)
 
 
-@dataclass(frozen=True)
+@value_record
 class Assumption:
     """What a result takes for granted of one thing, and how large an error of it would matter.
 
@@ -130,9 +131,9 @@ class Assumption:
             return "none does"
         return f"{size:.2g} mm" if self.is_length else f"{size:.2g}"
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Values:
         """Return what JSON holds; a size that no error reaches is null."""
-        values: dict[str, Any] = {"name": self.name, "sentence": self.sentence, "state": self.state}
+        values: Values = {"name": self.name, "sentence": self.sentence, "state": self.state}
         for parameter, key in SIZE_KEYS.items():
             size = self.size(parameter)
             values[key] = {"value": size if size < float("inf") else None, "unit": self.unit}

@@ -2,16 +2,17 @@
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from datetime import UTC, datetime
 from typing import Any, Self
 
 from memscal.errors import InputError
+from memscal.model.arrays import keyword_value_record, value_record
 from memscal.model.checks import Messages
 from memscal.version import __version__
 
 
-@dataclass(frozen=True)
+@value_record
 class SourceFile:
     """A file that was read: its base name (a folder may be private) and SHA-256 of its bytes.
 
@@ -39,7 +40,7 @@ def accepted_alterations(*sources: SourceFile | None) -> list[str]:
     return [f"{s.file_name} was changed after it was written: {s.altered}" for s in altered]
 
 
-@dataclass(frozen=True, kw_only=True)
+@keyword_value_record
 class Process:
     """What produced a result: program, options, environment, inputs, messages.
 

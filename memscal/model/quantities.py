@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from memscal.model.apparatus import ParameterSet
-from memscal.model.arrays import value_record
+from memscal.model.arrays import Axes, value_record
 from memscal.model.notation import VOLTS, Reading, format_measured
 
 # SI units in the unit that is shown: m in a mm, V in a mV, ...; dividing by MM shows mm.
@@ -86,7 +86,7 @@ class Quantity:
     dimension: str  # a key of DIMENSIONS, or of memscal.formats.groups.KINDS, such as "text"
     words: str = ""
     symbol: str = ""
-    axes: tuple[str, ...] = ()  # the quantities along which an array runs
+    axes: Axes = ()  # the quantities along which an array runs
     required: bool = False
     stored: str = ""  # the name in files where it is another
     shown: str = ""  # the unit where it is not its dimension's
@@ -152,7 +152,7 @@ class Record:
     signal: str = ""
 
     @property
-    def axes(self) -> tuple[str, ...]:
+    def axes(self) -> Axes:
         """Names of the axes of the signal."""
         return next((q.axes for q in self.quantities if q.key == self.signal), ())
 
@@ -171,7 +171,7 @@ def required(*quantities: Quantity) -> list[Quantity]:
     return [replace(quantity, required=True) for quantity in quantities]
 
 
-def along(axes: tuple[str, ...], *quantities: Quantity) -> list[Quantity]:
+def along(axes: Axes, *quantities: Quantity) -> list[Quantity]:
     """Return quantities as arrays that run along the same axes."""
     return [replace(quantity, axes=axes) for quantity in quantities]
 

@@ -34,11 +34,14 @@ FILM = record(
     Quantity("name", "text", "name of the film", origin="film"),
 )
 
-_RADIUS = measured(Quantity("radius", _L, "radius", "R", required=True))
-_INDENTER_NAME = Quantity("name", "text", "name of the indenter", origin="indenter")
-ROUND_INDENTER = record("NXcollection", *_RADIUS, _INDENTER_NAME)
-_SLOPE = Quantity("inclination", "angle", "inclination of the face", required=True)
-CONE = record("NXcollection", _SLOPE)
+ROUND_INDENTER = record(
+    "NXcollection",
+    *measured(Quantity("radius", _L, "radius", "R", required=True)),
+    Quantity("name", "text", "name of the indenter", origin="indenter"),
+)
+CONE = record(
+    "NXcollection", Quantity("inclination", "angle", "inclination of the face", required=True)
+)
 INDENTER_FACE = record(
     "NXdata",
     *required(
@@ -64,9 +67,8 @@ LOAD = record(
 INDENTER = record(
     "NXcollection",
     Quantity("shape", "text", "shape of the indenter", required=True),
-    *_RADIUS,
-    _INDENTER_NAME,
-    _SLOPE,
+    *ROUND_INDENTER.quantities,
+    *CONE.quantities,
     *LOAD.quantities,
 )
 """What the group of an indenter may hold, by its shape."""
@@ -276,8 +278,6 @@ RADIAL_COVARIANCE = record(
     Quantity("g_covariance", "per area squared", "covariance of G", axes=_RR, required=True),
     signal="g_covariance",
 )
-_G = RADIAL.quantities
-_COVARIANCE = RADIAL_COVARIANCE.quantities
 KERNEL_CHANGES = record(
     "NXdata",
     Quantity(
@@ -302,7 +302,13 @@ SHARED_EFFECTS = record(
     signal="of_transfer",
 )
 """Signed effects of one standard uncertainty of each source, in the order of names."""
-RADIAL_VERSION_1_0 = record("NXdata", *_G[:4], *_COVARIANCE[1:], _G[4], signal="g")
+RADIAL_VERSION_1_0 = record(
+    "NXdata",
+    *RADIAL.quantities[:4],
+    *RADIAL_COVARIANCE.quantities[1:],
+    RADIAL.quantities[4],
+    signal="g",
+)
 """The radial profile in files of version 1.0, which held its covariance."""
 TRANSFER = record(
     "NXdata",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import field, fields, replace
+from dataclasses import field, replace
 from functools import partial
 from types import MappingProxyType
 from typing import Any, Literal, NamedTuple, TypedDict, Unpack
@@ -160,22 +160,6 @@ def branch_numbers(name: str, stated: ArrayLike) -> NDArray[np.int64]:
             cure="Give 1 or 'approach', 2 or 'retreat', and 0 where it is not known.",
         )
     return numbers.astype(np.int64)
-
-
-#: Loads farther apart than this share are not one load that scatters; fewer readings are no line.
-_APART = 0.1
-_FEWEST = 5
-_MOST_GROUPS = 12
-
-
-def load_groups(loads: FloatArray) -> IndexArray:
-    """Number loads in N, (n,), by the few that were set, ascending; all 0 if these are not seen."""
-    order = np.argsort(loads, kind="stable")
-    index = np.zeros(loads.size, dtype=np.intp)
-    index[order[1:]] = np.cumsum(np.diff(np.log(loads[order])) > _APART)
-    counts = np.bincount(index)
-    seen = counts.min() >= _FEWEST and counts.size <= _MOST_GROUPS
-    return index if seen else np.zeros_like(index)
 
 
 class SetUp(NamedTuple):
@@ -480,7 +464,7 @@ class Scan:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle the fields, and prove them again: a read-only mapping cannot be pickled."""
-        values = {item.name: getattr(self, item.name) for item in fields(Scan)}
+        values = {name: getattr(self, name) for name in Scan.__dataclass_fields__}
         return partial(Scan, **{**values, "channels": dict(self.channels)}), ()
 
     def __repr__(self) -> str:
@@ -511,8 +495,8 @@ class Scan:
         if film is None or indenter is None:
             cure = (
                 '--reference point (reference="point"), or another source in their place: centre '
+                "and width of the image, and a G in which film and rod blur"
             )
-            cure += "and width of the image, and a G in which film and rod blur"
         raise InputError(
             f"{self.source.file_name if self.source else 'The scan'} states no {missing}.",
             why="The stress that an indenter makes at the base of a film is calculated from them.",
@@ -633,7 +617,7 @@ class Scan:
                 cure="Give the readings of one sensor (--u COLUMN).",
             )
         own: Values = {"sensors": names, "sensor": self.sensor, "u_zz": u_zz}
-        shapes: Values = {"u_zz_errors": u_zz.shape, **dict.fromkeys(OF_SENSORS, (number,))}
+        shapes = {"u_zz_errors": u_zz.shape, **dict.fromkeys(OF_SENSORS, (number,))}
         shapes |= {"layout": (number, 2), "layout_uncertainty": (number, 2)}
         for name, shape in shapes.items():
             own[name] = getattr(self, name)

@@ -161,14 +161,13 @@ def require_plausible(scan: Scan) -> None:
 
     x, y = (positions.ravel() for positions in scan.positions)
     steps = places_of(x, y, scan.passes.ravel()).steps
-    lengths["step"] = min((step for step in steps if step > 0), default=0.0)
+    lengths["step"] = min(filter(None, steps), default=0.0)
     lengths["width"] = _voltage_width(x, y, scan.u_zz.ravel())
-    width = lengths["width"]
     for length, most, words, why in (
         (lengths["step"], _LONGEST_STEP, "The positions' step is", f"{_WIDE}the scan misses it."),
         (span, _LONGEST_SPAN, "The positions span", _LONG),
         (rod_width, 1.0, "The rod's width is", "Under such a rod the stress depends on friction."),
-        (width, _WIDEST_VOLTAGE, "The voltage's width at half height is", _WIDER),
+        (lengths["width"], _WIDEST_VOLTAGE, "The voltage's width at half height is", _WIDER),
     ):
         if length > most * lengths["thickness"]:
             raise _implausible(scan, lengths, words, length, why)

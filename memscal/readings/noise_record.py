@@ -52,8 +52,7 @@ class NoiseRecord:
 
     def spectral_density(self, frequency: FloatArray) -> FloatArray:
         """One-sided spectral density in V^2/Hz at frequencies in Hz."""
-        slow = self._densities(np.asarray(frequency)) @ self.variances
-        return np.asarray(2 * self.step * self.white + slow)
+        return 2 * self.step * self.white + self._densities(frequency) @ self.variances
 
     @property
     def band(self) -> tuple[float, float]:
@@ -134,8 +133,9 @@ def _most_likely(power: FloatArray, densities: FloatArray) -> FloatArray:
     """Return the variances, (m,), by which few of the densities (f, m) make the periodogram."""
     edges = np.unique(np.geomspace(1, power.size, _BINS).astype(int)) - 1
     counts = np.diff(edges, append=power.size)
-    found = _means(power, edges, counts)
-    shapes = _means(densities.T, edges, counts).T
+    # Means over bins of frequency.
+    found = np.add.reduceat(power, edges) / counts
+    shapes = (np.add.reduceat(densities.T, edges, axis=-1) / counts).T
     # White noise, then whichever makes the record more likely, while it does so clearly: many
     # at once would follow the scatter of the few lowest lines.
     chosen = [0]
@@ -163,11 +163,6 @@ def _fitted(found: FloatArray, shapes: FloatArray, counts: IndexArray) -> tuple[
         variances = variances * rise / ((counts / fitted) @ shapes)
     fitted = shapes @ variances
     return variances, float(counts @ (found / fitted + np.log(fitted)))
-
-
-def _means(values: FloatArray, edges: IndexArray, counts: IndexArray) -> FloatArray:
-    """Return means along the last axis, of bins from edges."""
-    return np.asarray(np.add.reduceat(values, edges, axis=-1) / counts)
 
 
 def record_messages(scan: Scan) -> Iterator[Message]:

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from memscal.errors import UnitError
 from memscal.formats import units
-from memscal.formats.units import SI_UNITS, dimension_of, from_si, to_si
+from memscal.formats.units import dimension_of, from_si, to_si
 from memscal.model.quantities import DIMENSIONS
 
 PINT = pint.UnitRegistry()
@@ -17,7 +17,8 @@ PINT = pint.UnitRegistry()
 @pytest.mark.parametrize("unit", sorted({*units._CANONICAL} - {"", *units.ARBITRARY}))
 def test_the_table_agrees_with_pint(unit):
     dimension, power = units._CANONICAL[unit]
-    si = "dimensionless" if SI_UNITS[dimension] == "1" else SI_UNITS[dimension]
+    stated = DIMENSIONS[dimension].si
+    si = "dimensionless" if stated == "1" else stated
     quantity = PINT.Quantity(1.0, PINT.parse_units("dimensionless" if unit == "1" else unit))
     assert quantity.to(si).magnitude == pytest.approx(10.0**power, rel=1e-12)
 
@@ -66,7 +67,7 @@ def test_text_that_is_no_unit_of_length_is_refused_at_once(unit):
     assert "\x1b" not in str(caught.value)
 
 
-@pytest.mark.parametrize("dimension", [d for d in SI_UNITS if d != "dimensionless"])
+@pytest.mark.parametrize("dimension", [d for d in DIMENSIONS if d != "dimensionless"])
 def test_only_a_dimensionless_number_may_be_bare(dimension):
     with pytest.raises(UnitError, match="has no unit") as caught:
         to_si(1.0, None, dimension, "scan.h5: /entry/x")
@@ -74,7 +75,7 @@ def test_only_a_dimensionless_number_may_be_bare(dimension):
     assert to_si(0.5, None, "dimensionless", "here") == 0.5
 
 
-@given(st.floats(1e-100, 1e100), st.sampled_from(sorted(SI_UNITS)))
+@given(st.floats(1e-100, 1e100), st.sampled_from(sorted(DIMENSIONS)))
 def test_what_a_writer_converts_a_reader_converts_back(value, dimension):
     stored, unit = from_si(value, dimension)
     np.testing.assert_allclose(to_si(stored, unit, dimension, ""), value, rtol=4.5e-16)

@@ -181,11 +181,11 @@ def calibrate_array(
     if not found.used.any():
         raise FitError(
             f"None of the {counted(len(opened.sensors), 'sensors')} of the array answers the rod.",
-            why="Each has readings that lie below those far from the rod, at an end of its range, or "
-            "too few near its centre.",
-            cure="If readings fall under the rod, change their sign (--u-sign -1); state the ends of "
-            "the range in their unit (reading_low, reading_high, --ceiling); scan past the sensors "
-            "in steps of an eighth of the film's thickness.",
+            why="Readings do not rise under the rod, are at an end of the range, or are too few "
+            "near each centre.",
+            cure="If they fall under it, change their sign (--u-sign -1); state the ends of the "
+            "range in their unit (reading_low, reading_high, --ceiling); scan past the sensors in "
+            "steps of an eighth of the film's thickness.",
         )
     prepared = prepare((opened.of_sensor(found.largest),), request)
     first = prepared.scans[0]

@@ -13,8 +13,8 @@ from memscal.model.quantities import MM, Quantity, measured
 from memscal.summaries.declared import members
 from memscal.summaries.table import Table, percent
 
-#: Of more frames the first are printed, with so many columns; digits of numbers there, in files, and
-#: of what is carried over.
+#: Of more frames the first are printed, with so many columns; digits of numbers there, in files,
+#: and of what is carried over.
 _PRINTED = 20
 _COLUMNS = 8
 _SHORT = 4

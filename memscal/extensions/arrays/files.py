@@ -101,7 +101,6 @@ def read_open(file: SafeFile) -> ArrayData:
     opened = columns.shape[1] - len(read["inputs"])
     if {"layout_x", "layout_y"} <= read.keys():
         read["layout"] = np.column_stack([read["layout_x"], read["layout_y"]])
-    film, indenter = groups.read_stated(file)
     read |= {
         **groups.read_circumstances(file),
         "sensors": names,
@@ -112,8 +111,6 @@ def read_open(file: SafeFile) -> ArrayData:
         "modes": KernelModes(read["changes"], read["owner"]),
         "root": columns[:, :opened],
         "effects": dict(zip(read["inputs"], columns.T[opened:], strict=True)),
-        "film": film,
-        "indenter": indenter,
         "readings": ArrayReadings(**{n: read[n] for n in ArrayReadings.__dataclass_fields__}),
         "load": file.require_scalar("/entry/indenter/load", "force"),
         "reading": replace(reading, per=read["reference_unit"]),

@@ -94,10 +94,10 @@ def array_scan(
     if ceiling is not None:  # a calibration leaves out what is there, and says of which sensor
         high = to_si(ceiling, of.unit, of.dimension, "ceiling (--ceiling)")
         stated["reading_high"] = high
-        at_ceiling = np.sum(u_zz >= high)
+        at_ceiling = int(np.sum(u_zz >= high))
         if at_ceiling == np.isfinite(u_zz).sum():
             raise InputError(
-                f"All {at_ceiling} readings are at the ceiling of {ceiling:g} {of.unit} or above it.",
+                f"All {at_ceiling} readings are at or above the ceiling of {ceiling:g} {of.unit}.",
                 cure="Give the ceiling in the unit of the readings (--ceiling), or leave it out.",
             )
         notes.append(at_ceiling_text(at_ceiling))
@@ -139,7 +139,7 @@ def read_layout(source: Any, sensors: Sequence[str]) -> tuple[Values, str]:
         empty = np.flatnonzero(np.isnan(values))
         if empty.size:
             raise InputError(
-                f"{table.where(name)} is empty in {table.lines(empty)}.",
+                f"{table.where(name)} is empty in {table.lines(empty.tolist())}.",
                 why="A layout states all of each sensor.",
                 cure="Fill in the cells, or leave the column x_errors, y_errors or board out.",
             )

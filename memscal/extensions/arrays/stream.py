@@ -262,7 +262,7 @@ class Stream:
         """
         now = vars(self._now)
         stated: Any = state if isinstance(state, Mapping) else {}
-        given = {name: frozen_array(stated.get(name, [[]])) for name in now}
+        given: Any = {name: frozen_array(stated.get(name, [[]])) for name in now}
         fits = all(given[name].shape == value.shape for name, value in now.items())
         # What it was made with: rate, fields, noise, drift and limits.
         if not (fits and given["frames"] >= 0) or not np.allclose(

@@ -7,11 +7,11 @@ every dataset is checked before it is read.
 import hashlib
 import json
 import math
-import os
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from functools import partial, wraps
+from pathlib import PurePath
 from typing import Any, TypeVar, cast
 
 import h5py
@@ -21,6 +21,7 @@ from memscal.errors import FormatError, InputError, UnsafeFileError, placed
 from memscal.formats.files import FilePath, damage_named, read_bytes
 from memscal.formats.hdf5 import limits
 from memscal.formats.hdf5.limits import MAX_TEXT_BYTES, refuse
+from memscal.formats.hdf5.writer import SCHEMA_ATTRIBUTE
 from memscal.formats.units import dimension_of, to_si
 from memscal.model.arrays import FloatArray, Values
 from memscal.model.notation import printable
@@ -58,7 +59,7 @@ _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 def open_hdf5(path: FilePath, *, accept_altered: bool = False) -> Iterator["SafeFile"]:
     """Open an HDF5 file safely, for the time of a ``with`` block."""
     data = read_bytes(path, limit=MOST_HDF5_BYTES)
-    name = os.path.basename(os.fspath(path))
+    name = PurePath(path).name
     if not data.startswith(_SIGNATURE):
         raise FormatError(
             f"{name} is not an HDF5 file.",
@@ -109,7 +110,7 @@ class SafeFile:
         self.source = source
         self._accept_altered = accept_altered
         self._data = data
-        self._opened: dict[str, Any] = {"/": file["/"].id}
+        self._opened = {"/": file["/"].id}
         # Of a small file no more than it may well stand for.
         self._budget = self._most = limits.most_held(len(data))
         self.kept: dict[Any, Any] = {}
@@ -119,6 +120,11 @@ class SafeFile:
     def where(self, path: str) -> str:
         """Return file and path as messages name them."""
         return f"{self.name}: {path}"
+
+    @property
+    def schema(self) -> StoredAttribute:
+        """What the file says that it holds; nothing in most files of other programs."""
+        return self.attribute("/", SCHEMA_ATTRIBUTE)
 
     @property
     def verified(self) -> bool:
@@ -164,12 +170,12 @@ class SafeFile:
         values.setflags(write=False)
         return values
 
+    @_kept
     def claimed_number(self, path: str) -> int:
         """Return how many numbers a dataset claims to hold, of which none is read; 0 if absent."""
         if not self.has(path):
             return 0
-        with damage_named(f"{self.where(path)} cannot be read"):
-            return math.prod(limits.Layout.of(self.where(path), self._dataset(path)).shape)
+        return math.prod(limits.Layout.of(self.where(path), self._dataset(path)).shape)
 
     @_kept
     def text(self, path: str) -> str:
@@ -186,10 +192,10 @@ class SafeFile:
         dataset.read(h5py.h5s.ALL, h5py.h5s.ALL, value)
         return printable(value[()], MAX_TEXT_BYTES)
 
+    @_kept
     def is_text(self, path: str) -> bool:
         """Return whether a path holds a string and not a number."""
-        with damage_named(f"{self.where(path)} cannot be read"):
-            return bool(self._dataset(path).get_type().get_class() == h5py.h5t.STRING)
+        return bool(self._dataset(path).get_type().get_class() == h5py.h5t.STRING)
 
     @_kept
     def attribute(self, path: str, name: str) -> StoredAttribute:

@@ -17,7 +17,7 @@ from memscal.errors import InputError
 from memscal.formats.files import FilePath, atomic_write_bytes
 from memscal.formats.hdf5.limits import most_held
 from memscal.formats.units import from_si
-from memscal.model.arrays import Values, array_record
+from memscal.model.arrays import Axes, Values, array_record
 from memscal.model.notation import printable
 from memscal.model.sizes import too_large
 
@@ -37,7 +37,7 @@ DIGEST_ATTRIBUTE = "memscal_content_sha256"
 # The list of what was written: a reader can follow it without ever listing a group.
 CONTENTS_PATH = "/entry/contents/data"
 
-Attribute = str | int | tuple[str, ...]
+Attributes = Mapping[str, str | int | Axes]
 
 
 @array_record
@@ -46,8 +46,8 @@ class Number:
 
     values: NDArray[np.float64] | NDArray[np.int64]
     units: str
-    axes: tuple[str, ...] = ()
-    attributes: Mapping[str, Attribute] = field(default_factory=dict)
+    axes: Axes = ()
+    attributes: Attributes = field(default_factory=dict)
 
 
 @array_record
@@ -55,7 +55,7 @@ class Text:
     """A string with attributes; one without is a plain ``str``."""
 
     value: str
-    attributes: Mapping[str, Attribute]
+    attributes: Attributes
 
 
 @array_record
@@ -64,7 +64,7 @@ class Group:
 
     nx_class: str
     children: Mapping[str, "Node"]
-    attributes: Mapping[str, Attribute] = field(default_factory=dict)
+    attributes: Attributes = field(default_factory=dict)
 
 
 Node = Group | Number | Text | str
@@ -73,7 +73,7 @@ Nodes = dict[str, Node]
 """Nodes of a group by their names."""
 
 
-def si(values: ArrayLike, dimension: str, axes: tuple[str, ...] = ()) -> Number:
+def si(values: ArrayLike, dimension: str, axes: Axes = ()) -> Number:
     """Return SI values as a number in the unit that our files use for their dimension."""
     return Number(*from_si(values, dimension), axes)
 
@@ -135,9 +135,8 @@ def content_digest(items: Iterable[DigestItem]) -> str:
     total = hashlib.sha256()
     for path, value, attributes in items:
         kind, shape, data = _canonical(value)
-        plain = dict(attributes)
-        plain |= {n: printable(v, len(v)) for n, v in plain.items() if isinstance(v, str)}
-        item = [path, kind, shape, plain, hashlib.sha256(data).hexdigest()]
+        texts = {n: printable(v, len(v)) for n, v in attributes.items() if isinstance(v, str)}
+        item = [path, kind, shape, attributes | texts, hashlib.sha256(data).hexdigest()]
         line = json.dumps(item, sort_keys=True, separators=(",", ":"))
         total.update(line.encode("ascii") + b"\n")
     return total.hexdigest()
@@ -183,11 +182,10 @@ def file_tree(schema: str, entry: Group) -> Group:
     if schema in DEFINED:
         definition = Text(f"NX{schema.replace('-', '_')}", {"version": SCHEMA_VERSION})
         entry = replace(entry, children={"definition": definition, **entry.children})
-    root = Group("NXroot", {"entry": entry}, {"default": "entry", **schemas})
-    listed = _with_contents(root, "")
+    listed = _with_contents(entry, schemas, "")
     # The list names itself, so it is made once with a place for itself and once in full.
     contents = {path: sorted(_attributes(node)) for path, node in walk(listed)}
-    listed = _with_contents(root, to_json(contents))
+    listed = _with_contents(entry, schemas, to_json(contents))
     nodes = sorted(walk(listed), key=lambda item: item[0])
     digest = content_digest((path, node, _attributes(node)) for path, node in nodes)
     return replace(listed, attributes={**listed.attributes, DIGEST_ATTRIBUTE: digest})
@@ -220,12 +218,10 @@ def tree_to_bytes(root: Group) -> bytes:
     return data
 
 
-def _with_contents(root: Group, text: str) -> Group:
-    entry = root.children["entry"]
-    assert isinstance(entry, Group)
+def _with_contents(entry: Group, schemas: dict[str, str], text: str) -> Group:
     listing = note(text, media_type="application/json", description=_CONTENTS)
     entry = replace(entry, children={**entry.children, "contents": listing})
-    return replace(root, children={**root.children, "entry": entry})
+    return Group("NXroot", {"entry": entry}, {"default": "entry", **schemas})
 
 
 def _write_group(group: Any, node: Group) -> None:

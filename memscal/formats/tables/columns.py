@@ -47,6 +47,9 @@ _UNITS = {"u": "mV", "load": "N", "time": "s", "sigma": "Pa"}
 #: Room beyond the rows that were counted.
 _SPARE = 250
 
+Column = str | int
+"""The name or the number of a column."""
+
 Lines = range | list[int] | NDArray[np.int32]
 Parts = Iterator[tuple[Lines, list[FloatArray]]]
 """Lines and columns of one part after another."""
@@ -55,7 +58,7 @@ Parts = Iterator[tuple[Lines, list[FloatArray]]]
 class Wanted(NamedTuple):
     """A column by its name or number, its unit, and words that stand for numbers in it."""
 
-    column: str | int
+    column: Column
     unit: str | None = None
     dimension: str = "dimensionless"
     words: Mapping[str, float] = MappingProxyType({})
@@ -91,7 +94,7 @@ class NamedColumns:
         self._missing = {*MISSING, *(word.strip().lower() for word in missing)}
         self._sentinels = [number_of(w.replace(",", ".")) for w in missing if is_number(w)]
         # Cells that are no numbers, by column: how many, and the first of them with their lines.
-        self._wrong: dict[str | int, tuple[list[int], list[str]]] = {}
+        self._wrong: dict[Column, tuple[list[int], list[str]]] = {}
         # Lines of the rows, part by part.
         self._lines_of: list[Lines] = []
 
@@ -133,7 +136,7 @@ class NamedColumns:
         }
 
     def unit_of(
-        self, column: str | int, unit: str | None, option: str, default: str | None = None
+        self, column: Column, unit: str | None, option: str, default: str | None = None
     ) -> str:
         """Return the unit of a column: of its head, of the row of units, or the one given."""
         index = self.index_of(column)
@@ -163,7 +166,7 @@ class NamedColumns:
         """Names of the columns without units."""
         return [self._cut(name)[0] for name in self.names]
 
-    def where(self, column: str | int) -> str:
+    def where(self, column: Column) -> str:
         """Return file and column as messages name them."""
         return f"{self._name}: column {column!r}"
 
@@ -179,7 +182,7 @@ class NamedColumns:
         """Return the line of the file of each row, (n,)."""
         return np.concatenate(self._lines_of)
 
-    def index_of(self, column: str | int) -> int:
+    def index_of(self, column: Column) -> int:
         """Return the number of a column, from 0, that is given by its name, head or number."""
         if isinstance(column, str) and self.names.count(column) == 1:
             return self.names.index(column)
@@ -257,7 +260,7 @@ class NamedColumns:
         self._others.append(Wanted(name, words=units))
         return True
 
-    def _reject(self, cell: str, line: int, column: str | int) -> None:
+    def _reject(self, cell: str, line: int, column: Column) -> None:
         lines, cells = self._wrong.setdefault(column, ([], []))
         lines.append(line)
         if cell in self.names:

@@ -148,7 +148,7 @@ def find_delimiter(lines: list[str]) -> str:
     return best
 
 
-def find_decimal(rows: Rows, marks: str = ",.") -> str:
+def find_decimal(rows: Rows, marks: str) -> str:
     """Return the decimal mark of rows; of these marks one is refused that may part thousands.
 
     A comma is it only where cells hold one comma each and no point.

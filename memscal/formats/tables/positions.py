@@ -1,6 +1,6 @@
 """Positions of the readings of a table, of its columns or made, and the line that they are."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -8,11 +8,11 @@ import numpy as np
 from memscal.errors import InputError
 from memscal.extensions import hook
 from memscal.formats.tables.stated import TableLayout
-from memscal.model.arrays import Columns
+from memscal.model.arrays import Columns, Values
 from memscal.model.scan import LINE
 
 
-def require_positions(named: Mapping[str, Any], layout: TableLayout, *, resting: bool) -> None:
+def require_positions(named: Values, layout: TableLayout, *, resting: bool) -> None:
     """Refuse a table without positions, or with two kinds of them."""
     columns = named["x"] is not None or named["y"] is not None
     if resting:
@@ -45,7 +45,7 @@ def make_positions(
     columns: Columns, layout: TableLayout, notes: list[str], name_rows: Callable[[Any], str]
 ) -> int | None:
     """Make the positions that no column states; return how many presses were counted for it."""
-    presses: int | None = None
+    presses = None
     if layout.speed is not None and "time" in columns:
         time = columns["time"]
         stated = np.flatnonzero(np.isfinite(time))
@@ -62,7 +62,7 @@ def make_positions(
             from scipy.integrate import cumulative_trapezoid
 
             # From the last reading forth to the first one back half of the time is forth.
-            way: Any = cumulative_trapezoid(np.nan_to_num(signs[stated]), time[stated], initial=0)
+            way = cumulative_trapezoid(np.nan_to_num(signs[stated]), time[stated], initial=0)
             columns["x"][stated] = abs(layout.speed) * way
         notes.append(f"The positions are {layout.speed * 1e3:.4g} mm/s times the time.")
     elif layout.step is not None:

@@ -1,6 +1,6 @@
 """References from samples of a calculated stress, checked; and from tables."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -8,9 +8,9 @@ import numpy as np
 
 from memscal.errors import InputError
 from memscal.formats.files import FilePath
-from memscal.formats.tables.columns import Wanted
+from memscal.formats.tables.columns import Column, Wanted
 from memscal.formats.tables.sheets import open_table
-from memscal.model.arrays import Arrays, array_record, keyword_array_record
+from memscal.model.arrays import Arrays, Values, array_record, keyword_array_record
 from memscal.model.checks import Message, import_notes, marked_texts
 from memscal.model.provenance import SourceFile
 from memscal.model.stress import StressProfile
@@ -73,7 +73,7 @@ def require_numbers(samples: Samples) -> None:
             )
 
 
-def profile_of(samples: Samples, stated: Mapping[str, Any], value: float | None) -> ImportedProfile:
+def profile_of(samples: Samples, stated: Values, value: float | None) -> ImportedProfile:
     """Check samples of a stress, sort them by radius, and hold their force against the load."""
     # Without a load it is their force, to which they are scaled where a value in N is given.
     name = samples.source.file_name
@@ -109,7 +109,7 @@ def profile_of(samples: Samples, stated: Mapping[str, Any], value: float | None)
     return ImportedProfile(replace(profile, notes="\n".join(marked_texts(notes))), tuple(notes))
 
 
-def _sorted_by_radius(samples: Samples, notes: list[Message]) -> dict[str, Any]:
+def _sorted_by_radius(samples: Samples, notes: list[Message]) -> Values:
     """Sort, and average the values that element-wise output gives twice at a shared node."""
     columns = samples.columns
     order = np.argsort(columns["r"], kind="stable")
@@ -182,8 +182,6 @@ def _compare_with_load(profile: StressProfile, samples: Samples) -> list[Message
     return [*carried, Message("force_differs", warning, "warning")]
 
 
-Column = str | int
-
 # Radii that differ by less than this share of the largest are the same, but for rounding.
 _SAME = 1e-9
 
@@ -198,7 +196,7 @@ def read_reference_table(
     sign: int = 1,
     shear: Column | None = None,
     shear_sign: int = 1,
-    reading: Mapping[str, Any] | None = None,
+    reading: Values | None = None,
     value: float | None = None,
     **stated: Any,
 ) -> ImportedProfile:

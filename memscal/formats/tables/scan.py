@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from memscal.errors import InputError, counted, require_names
 from memscal.extensions import hook
-from memscal.formats.tables.columns import NamedColumns, Wanted
+from memscal.formats.tables.columns import Column, NamedColumns, Wanted
 from memscal.formats.tables.positions import direction_of, make_positions, require_positions
 from memscal.formats.tables.reference import require_sign
 from memscal.formats.tables.sheets import open_table
@@ -23,12 +23,12 @@ from memscal.model.indenter import Rod, RoundIndenter
 from memscal.model.notation import Reading, format_measured
 from memscal.model.quantities import dimension_in
 from memscal.model.records import DYNAMICS, FILM, LOAD, ROUND_INDENTER, TAKEN_FOR_GRANTED
-from memscal.model.scan import BRANCHES, DIRECTIONS, ArrayOptions, Scan, branch_numbers, load_groups
+from memscal.model.scan import BRANCHES, DIRECTIONS, ArrayOptions, Scan, branch_numbers
 from memscal.progress import Listener, reported
 from memscal.readings.ceiling import without_clipped
 from memscal.readings.dead_rows import without_dead_rows
 from memscal.readings.find_holds import find_holds
-from memscal.readings.find_places import places_of
+from memscal.readings.find_places import clusters, places_of
 from memscal.readings.mistaken_unit import (
     require_depth,
     require_plausible,
@@ -36,10 +36,6 @@ from memscal.readings.mistaken_unit import (
     require_span,
     warn_of_readings,
 )
-
-Column = str | int
-#: Dimension of a column, its unit as it is stated, the option that states it, and the default.
-Form = tuple[str, str | None, str, str | None]
 
 _RECORDS = {"layout": TableLayout, "conditions": ScanConditions, "uncertainties": ScanUncertainties}
 #: What of a layout is for who opens the table.
@@ -66,6 +62,10 @@ _CLOSE = 0.1
 _MANY = 0.25
 #: Loads of one line that differ by more than this share were hardly meant to be one.
 _MIXED = 0.3
+#: Loads farther apart than this share are not one load that scatters; fewer readings are no line.
+_APART = 0.1
+_FEWEST = 5
+_MOST_GROUPS = 12
 
 
 @keyword_array_record
@@ -247,7 +247,7 @@ def _require_sizes(scan: Scan) -> None:
 
 
 def _listed(column: Column | Sequence[Column] | None) -> list[Column]:
-    return [column] if isinstance(column, str | int) else list(column or ())
+    return [column] if isinstance(column, Column) else list(column or ())
 
 
 def scan_of_arrays(x: ArrayLike, u: ArrayLike, **options: Any) -> ImportedScan:
@@ -275,7 +275,7 @@ def scan_of_arrays(x: ArrayLike, u: ArrayLike, **options: Any) -> ImportedScan:
 
 def records_of(stated: Values) -> Values:
     """Take the fields of layout, conditions and uncertainties from what is stated; return these."""
-    records: Values = {}
+    records = {}
     for name, record in _RECORDS.items():
         own = stated.keys() & {item.name for item in fields(record)}
         records[name] = record(**{field: stated.pop(field) for field in own})
@@ -283,7 +283,7 @@ def records_of(stated: Values) -> Values:
 
 
 def _require_use(
-    named: Mapping[str, Column | None],
+    named: Values,
     layout: TableLayout,
     conditions: ScanConditions,
     uncertainties: ScanUncertainties,
@@ -359,11 +359,12 @@ def _wanted(
     reading = reading_of(u_unit, table.where(u))
     of_u = dimension_in("voltage", reading)
     channel = (of_u, layout.u_unit, "u_unit (--u-unit)", u_unit)
-    force: Form = ("force", layout.load_unit, "load_unit (--load-unit)", "N")
-    length: Form = ("length", layout.x_unit, "x_unit (--x-unit)", None)
-    if layout.step is not None:
-        length = ("dimensionless", layout.x_unit, "x_unit (--x-unit)", "1")
-    forms: dict[str, Form] = {
+    force = ("force", layout.load_unit, "load_unit (--load-unit)", "N")
+    # With a step places are counted.
+    of_x, unit_of_x = ("length", None) if layout.step is None else ("dimensionless", "1")
+    length = (of_x, layout.x_unit, "x_unit (--x-unit)", unit_of_x)
+    # Dimension, unit as it is stated, the option that states it, and the default.
+    forms = {
         "u_zz": channel,
         "u_xz": channel,
         "u_yz": channel,
@@ -461,7 +462,7 @@ def _scan_of(
     holds: Holds | None,
 ) -> ImportedScan:
     """Return the scan of columns without gaps in their positions, and add to the notes."""
-    stated: Values = {**vars(conditions), **vars(uncertainties)}
+    stated = {**vars(conditions), **vars(uncertainties)}
     del stated["noise"]  # that of each reading is a column
     load_scatter = stated.pop("load_scatter")
     x_error = stated.pop("x_error")
@@ -478,8 +479,9 @@ def _scan_of(
             columns["repeat"] = np.append(0, np.cumsum(turns))
     loads_in_words = _numbered_by_load(columns, notes)
     stated["load"] = _nominal_load(columns.get("normal_load"), conditions.load, notes)
-    if load_scatter is not None and "normal_load" not in columns:
-        columns["normal_load"] = np.full(columns["u_zz"].shape, stated["load"])
+    if load_scatter is not None:
+        columns.setdefault("normal_load", np.full(columns["u_zz"].shape, stated["load"]))
+        columns["normal_load_errors"] = load_scatter * columns["normal_load"]
     along = direction_of(columns, notes)
     stated["direction"] = conditions.direction or along
     if conditions.motion != "rest":
@@ -495,15 +497,11 @@ def _scan_of(
         messages += _mixed_loads(columns["normal_load"], columns.get("repeat"), conditions.indenter)
     columns = _as_rows(columns)
     further = [name for name in columns if " of " in name or name.startswith(("u_xz", "u_yz"))]
-    channels: Columns = {name: columns.pop(name) for name in further}
-    if load_scatter is not None:
-        columns["normal_load_errors"] = load_scatter * columns["normal_load"]
+    channels = {name: columns.pop(name) for name in further}
     if x_error is not None:
         columns["x_errors"] = np.full(columns["x"].size, x_error)
-    arrays: Values = dict(columns)
     return ImportedScan(
-        **arrays,
-        **stated,
+        **(stated | columns),
         unit=reading.si,
         source=table.source,
         channels=channels,
@@ -518,10 +516,11 @@ def _numbered_by_load(columns: Columns, notes: list[str]) -> str:
     loads = columns.get("normal_load")
     if loads is None or "y" in columns or not np.all(loads > 0):
         return ""
-    groups = load_groups(loads)
-    if not groups.any():
+    groups, _ = clusters(np.log(loads), _APART)
+    counts = np.bincount(groups)
+    if not 1 < counts.size <= _MOST_GROUPS or counts.min() < _FEWEST:
         return ""
-    levels = [f"{np.median(loads[groups == i]):.4g}" for i in range(groups.max() + 1)]
+    levels = [f"{np.median(loads[groups == i]):.4g}" for i in range(counts.size)]
     words = f"of {', '.join(levels[:-1])} and {levels[-1]} N"
     if "repeat" not in columns:
         columns["repeat"] = groups
@@ -535,15 +534,14 @@ def _nominal_load(
     """Take the median of a column as the nominal load; refuse one that contradicts the column."""
     if loads is None:
         return stated
-    load = stated
-    if load is None:
-        load = float(np.nanmedian(loads))
-        notes.append(f"The nominal load is the median of the column: {load:.4g} N.")
-    require_recorded(load, loads)
-    return load
+    if stated is None:
+        stated = float(np.nanmedian(loads))
+        notes.append(f"The nominal load is the median of the column: {stated:.4g} N.")
+    require_recorded(stated, loads)
+    return stated
 
 
-def _set_up_in_words(stated: Mapping[str, Any]) -> Iterator[str]:
+def _set_up_in_words(stated: Values) -> Iterator[str]:
     """Yield what was pressed on what, with each uncertainty, as it was taken."""
     film = stated["film"]
     indenter = stated["indenter"]
@@ -568,7 +566,7 @@ def _set_up_in_words(stated: Mapping[str, Any]) -> Iterator[str]:
             yield f"{name.capitalize()}: {', '.join(words) or 'not stated'}."
 
 
-def _granted_in_words(stated: Mapping[str, Any]) -> Iterator[str]:
+def _granted_in_words(stated: Values) -> Iterator[str]:
     """Yield which uncertainties are stated of what a scan else takes for granted."""
     words = []
     for quantity in TAKEN_FOR_GRANTED.quantities:

@@ -11,6 +11,7 @@ import zipfile
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from importlib import import_module
+from os import PathLike
 from pathlib import PurePath
 from types import MappingProxyType
 from typing import Any
@@ -20,7 +21,7 @@ import numpy as np
 from memscal.errors import FormatError, InputError, UnsafeFileError, counted, placed
 from memscal.extensions import hook
 from memscal.formats.files import damage_named, read_bytes
-from memscal.formats.tables.columns import Lines, NamedColumns, Parts, Wanted
+from memscal.formats.tables.columns import MAX_NAME, Lines, NamedColumns, Parts, Wanted
 from memscal.formats.tables.dialect import find_decimal
 from memscal.formats.tables.text_table import Sheet, TextTable
 from memscal.model.arrays import FloatArray, unmasked
@@ -50,7 +51,6 @@ _NO_RESULT = re.compile(
     rb"\s*(?:<(?:\w+:)?v\s*/>|<(?:\w+:)?v>\s*</[^>]*>)?\s*</(?:\w+:)?c>"
 )
 _SAID = rb'<\1c \2 t="str"><\1v>a formula without a stored result</\1v></\1c>'
-_MAX_NAME = 80
 
 
 def open_table(
@@ -62,7 +62,7 @@ def open_table(
     With ``gaps`` rows below the head are readings though nothing stands in them.
     """
     reading = {name: value for name, value in reading.items() if value or value == 0}
-    path = isinstance(source, str) or hasattr(source, "__fspath__")
+    path = isinstance(source, str | PathLike)
     ending = PurePath(source).suffix.lower() if path else ""
     if ending in _OTHERS:
         problem = f"{source} is a workbook of a kind that is not read."
@@ -162,7 +162,7 @@ def _inflated(data: bytes, name: str) -> io.BytesIO:
             # Entities multiply, and other encodings hide them.
             encoding = re.search(rb"encoding\s*=\s*[\"']([^\"']*)", xml[:200])
             if b"\0" in xml or b"<!" in xml or (encoding and encoding[1].lower() != b"utf-8"):
-                where = f"{name}: {printable(entry.filename, _MAX_NAME)}"
+                where = f"{name}: {printable(entry.filename, MAX_NAME)}"
                 problem = f"{where} has declarations or an encoding that no workbook has."
                 raise UnsafeFileError(problem, cure="Save the sheet as CSV.")
             unpacked.writestr(entry.filename, xml)
@@ -198,7 +198,7 @@ class FrameTable(NamedColumns):
         missing: Sequence[str] = (),
     ) -> None:
         super().__init__(name, missing)
-        self.names = tuple(printable(head, _MAX_NAME) for head in names)
+        self.names = tuple(printable(head, MAX_NAME) for head in names)
         self.source = source
         self.decimal = decimal
         self._unit_row = tuple(units)

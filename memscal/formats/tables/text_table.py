@@ -4,10 +4,10 @@ import codecs
 import csv
 import hashlib
 import itertools
-import os
 import re
 import warnings
 from collections.abc import Iterable, Iterator, Sequence, Set
+from pathlib import PurePath
 from typing import NamedTuple
 
 import numpy as np
@@ -79,7 +79,7 @@ class TextTable(NamedColumns):
         sheet: Sheet | None = None,
         gaps: bool = False,
     ) -> None:
-        super().__init__(os.path.basename(os.fspath(path)), missing)
+        super().__init__(PurePath(path).name, missing)
         self._path = path
         self._sheet = sheet
         self._gaps = gaps
@@ -163,8 +163,8 @@ class TextTable(NamedColumns):
             self._unit_row = ()
             self._header = places[start]
         self._headed = bool(names)
-        self._width = max(len(names), *map(len, rows[start:]))
-        heads = [*names, *[""] * (self._width - len(names))]
+        longest = max(len(names), *map(len, rows[start:]))
+        heads = [*names, *[""] * (longest - len(names))]
         self.names = tuple(printable(c, MAX_NAME) or str(i + 1) for i, c in enumerate(heads))
         self._first = rows[start:], places[start:]
         self._columns = len(names) or width
@@ -226,7 +226,9 @@ class TextTable(NamedColumns):
             mark = "comma" if self.decimal == "," else "point"
             delimiter = DELIMITERS.get(self._delimiter, repr(self._delimiter))
             apart = f"separated by a {delimiter}, with a decimal {mark}"
-        notes.append(f"Read {counted(count, 'rows')} of {counted(self._width, 'columns')} {apart}.")
+        notes.append(
+            f"Read {counted(count, 'rows')} of {counted(len(self.names), 'columns')} {apart}."
+        )
         self.notes = tuple(notes)
 
     def _refuse_more_names(self) -> None:
@@ -436,7 +438,7 @@ def read_indenter_table(path: FilePath, *, r_unit: str | None, z_unit: str | Non
     z_unit = table.unit_of(2, z_unit, "z_unit (--z-unit)", "um")
     wanted = {"1": Wanted(1, r_unit, "length"), "2": Wanted(2, z_unit, "length")}
     columns = table.columns(wanted)
-    name = os.path.basename(os.fspath(path))
+    name = PurePath(path).name
     with placed(name):
         # What a microscope calls zero is anywhere.
         profile = Profile(r=columns["1"], z=columns["2"] - columns["2"].min())
