@@ -35,7 +35,7 @@ from memscal.extensions.arrays.presses import (
     sorted_readings,
 )
 from memscal.extensions.arrays.sensor_array import SensorArray
-from memscal.formats.scan import read_scan
+from memscal.formats.opened import given_scan
 from memscal.model.arrays import (
     Arrays,
     BoolArray,
@@ -224,7 +224,7 @@ def calibrate_array(
 
 def _opened(scan: Scan | str | PathLike[str], *, accept_altered: bool) -> Scan:
     """Return the scan of an array, given itself or as a path; refuse that of a single sensor."""
-    opened = scan if isinstance(scan, Scan) else read_scan(scan, accept_altered=accept_altered)
+    opened = given_scan(scan, accept_altered=accept_altered)
     if not opened.sensors:
         raise InputError(
             "The scan is that of a single sensor, not of an array.",

@@ -261,7 +261,8 @@ class Stream:
             If the state is not of such a stream.
         """
         now = vars(self._now)
-        stated: Any = state if isinstance(state, Mapping) else {}
+        stated: Any = state
+        stated = stated if isinstance(stated, Mapping) else {}
         given: Any = {name: frozen_array(stated.get(name, [[]])) for name in now}
         fits = all(given[name].shape == value.shape for name, value in now.items())
         # What it was made with: rate, fields, noise, drift and limits.
