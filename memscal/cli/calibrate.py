@@ -211,7 +211,7 @@ def calibration_settings(
     options: tuple[str, ...],
     seed: int | None,
     **others: Any,
-) -> dict[str, Any]:
+) -> Options:
     """Return the options of :func:`memscal.calibrate` that options of the command line ask for."""
     accepted = others["accept_altered"]
     return {

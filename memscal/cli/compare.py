@@ -32,9 +32,9 @@ if TYPE_CHECKING:
 
 def figure_stems(lubrications: Iterable[str], *, interface: bool) -> list[str]:
     """Return the stems of all figures' names, without matplotlib; a test compares both."""
-    tails = [f"-{name}" if name else "" for name in dict.fromkeys(lubrications)]
     stems = []
-    for tail in tails:
+    for name in dict.fromkeys(lubrications):
+        tail = f"-{name}" if name else ""
         stems += [f"profiles{tail}", f"friction-set{tail}"]
     stems += ["maxima", "effective-friction", "likelihood"]
     return [*stems, "interface"] if interface else stems

@@ -329,7 +329,7 @@ def _example(table: Path, missing: Sequence[str], options: Options) -> str:
     )
 
 
-def stated_options(values: dict[str, Any], names: Iterable[str]) -> dict[str, Any]:
+def stated_options(values: Options, names: Iterable[str]) -> Options:
     """Return the options that were given, so that the library's own defaults hold."""
     return {name: values[name] for name in names if values[name] is not None}
 
@@ -342,8 +342,8 @@ _UNKNOWN = (
 )
 
 
-def _set_up(options: Options) -> dict[str, Any]:
-    stated: dict[str, Any] = {}
+def _set_up(options: Options) -> Options:
+    stated: Options = {}
     if stated_options(options, (*FILM_NUMBERS, *LAW, "film_name")):
         stated["film"] = film_from(options, _UNKNOWN)
     if stated_options(options, _INDENTER):

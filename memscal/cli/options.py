@@ -22,10 +22,6 @@ if TYPE_CHECKING:
     from memscal.model.indenter import RoundIndenter
     from memscal.model.scan import Scan
 
-    _Number = click.ParamType[float]
-else:  # generic since click 8.2 only
-    _Number = click.ParamType
-
 _Command = Callable[..., Any]
 _Scan = TypeVar("_Scan", bound="Scan")
 _Adder = Callable[[_Command], _Command]
@@ -77,7 +73,7 @@ def si(value: float, power: int) -> float:
     return float(Decimal(repr(value)).scaleb(power))
 
 
-class Quantity(_Number):
+class Quantity(click.ParamType):  # type: ignore[type-arg] # generic since click 8.2 only
     """A finite number in a unit, the name of the value; it becomes one in SI units."""
 
     def __init__(

@@ -239,8 +239,8 @@ def _pressed(indenter: str, options: Options) -> list[Contact]:
     if friction is None:
         # A film that slides is drawn out from under a rod, and is not solved to any depth.
         friction = math.inf if indenter == "rod" and not linear else 0.0
-    depths = list(options["depths"])
-    loads = None if depths else list(options["loads"] or (1.0,))
+    depths = options["depths"]
+    loads = None if depths else options["loads"] or (1.0,)
     with out.working("Pressing"):
         return indent(
             film,
