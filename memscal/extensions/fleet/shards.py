@@ -213,7 +213,7 @@ def _correlation(covariance: FloatArray) -> FloatArray:
     return np.asarray(correlation[np.triu_indices(u.size, 1)])
 
 
-def write_shard(path: Path, rows: Sequence[Values], digest: str) -> None:
+def write_shard(path: Path, rows: list[Values], digest: str) -> None:
     """Write a table whole or not at all; its metadata state the digest of what it is made from."""
     pa = arrow()
     about = {
@@ -223,7 +223,7 @@ def write_shard(path: Path, rows: Sequence[Values], digest: str) -> None:
         DIGEST: digest,
     }
     readings = {row["reading"] for row in rows if "reading" in row} or {VOLTS}
-    table = pa.Table.from_pylist(list(rows), _schema(readings).with_metadata(about))
+    table = pa.Table.from_pylist(rows, _schema(readings).with_metadata(about))
     packing = {"compression": "zstd", "use_dictionary": False, "write_page_checksum": True}
     sink = pa.BufferOutputStream()
     pa.parquet.write_table(table, sink, **packing)

@@ -383,7 +383,7 @@ def _repairs(
 
 def _messages(read: Sequence[ApparatusFunction]) -> Iterator[Message]:
     """Yield what weakens the history, and what would mend it."""
-    numbered = [bool(one.sensor.serial_number) for one in read]
+    numbered = [one.sensor.serial_number for one in read]
     failed = "failed a quality check."
     lacking = {
         failed: [not one.passed for one in read],

@@ -163,7 +163,7 @@ def _described(scan: Scan, path: Path) -> Options:
         "scan": str(path),
         "synthetic": True,
         "kind": scan.kind,
-        "shape": list(scan.u_zz.shape),
+        "shape": scan.u_zz.shape,
         "truth": {name: _member(name, value) for name, value in (scan.synthetic or {}).items()},
     }
 

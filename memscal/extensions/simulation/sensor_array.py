@@ -3,13 +3,7 @@
 import numpy as np
 
 from memscal.extensions.simulation.sensor import Truth
-from memscal.model.arrays import (
-    FloatArray,
-    Values,
-    array_record,
-    require_positive,
-    require_range,
-)
+from memscal.model.arrays import FloatArray, Values, array_record, require_positive, require_range
 
 #: Scatter of the conversion constants, and of the centres about the layout, in m.
 _SCATTER = 0.05
