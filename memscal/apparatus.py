@@ -177,8 +177,7 @@ class ApparatusFunction(Result, ApparatusData):
         if y is not None:
             if isinstance(sigma_zz, IdealReference):
                 return self._of_ideal(self.convolve, r, y, sigma_zz)
-            stress = self._checked_field(r, y, sigma_zz)
-            return _convolved(r, y, stress, self.field)
+            return _convolved(r, y, self._checked_field(r, y, sigma_zz), self.field)
         radii, spectrum = self._checked(r, sigma_zz)
         profile = self.radial_profile
         kernel = hankel_transform(profile.r, profile.g, spectrum.wavenumbers.k)

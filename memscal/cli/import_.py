@@ -209,8 +209,7 @@ def command(
         with out.working("Reading"):
             notes = convert(table, None if dry_run else output, kind, options, force=force)
         if save_recipe and not dry_run:
-            text = hook("recipe_text")(context)
-            out.write_files({save_recipe: text.encode()}, force=force)
+            out.write_files({save_recipe: hook("recipe_text")(context).encode()}, force=force)
         warnings = [note for note in notes if note.severity == "warning"]
         if as_json:
             out.emit_json(

@@ -127,13 +127,13 @@ NonNegative = partial(Quantity, open_low=False)
 
 
 def option(
-    names: str, kind: Any = None, default: Any = None, *, show_default: bool = True, **settings: Any
+    names: str, kind: Any = None, default: Any = None, **settings: Any
 ) -> Callable[[str], _Adder]:
     """Return what makes an option of its help text; blanks part its names."""
     # A kind that is a text is the name of the value, which is then any text.
     settings |= {"metavar": kind} if isinstance(kind, str) else {"type": kind}
     if default is not None:
-        settings |= {"default": default, "show_default": show_default}
+        settings = {"default": default, "show_default": True} | settings
     return lambda about: click.option(*names.split(), help=about, **settings)
 
 
@@ -314,8 +314,7 @@ def _measured(
     """Return the options of quantities, then those of their uncertainties (the last texts)."""
     options = [(name, kind, about) for name, kind, about, _ in entries]
     for name, kind, _, of in entries if uncertainties else ():
-        spread = NonNegative(kind.name)
-        options.append((f"{name}-uncertainty", spread, _UNCERTAINTY + of))
+        options.append((f"{name}-uncertainty", NonNegative(kind.name), _UNCERTAINTY + of))
     return options_of(
         *(option(f"--{name}", kind, defaults.get(name))(about) for name, kind, about in options)
     )

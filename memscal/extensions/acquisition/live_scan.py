@@ -132,8 +132,7 @@ class LiveScan:
         x, u, load, time = np.array(self._rows).T
         known: Values = {"load_column": load, "time": time - time[0]}
         known = {name: values for name, values in known.items() if np.isfinite(values).any()}
-        made = Scan.from_arrays(x, u, **self.units, **known)
-        return replace(made, **self.stated)
+        return replace(Scan.from_arrays(x, u, **self.units, **known), **self.stated)
 
     def calibrate(self) -> Calibration:
         """Calibrate what was read so far, and keep it as ``result``; errors are raised."""

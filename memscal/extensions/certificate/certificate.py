@@ -202,9 +202,8 @@ def certify(
     language = sections["certificate"].get("language", "en")
     texts = tomllib.loads((TEXTS / f"{language}.toml").read_text(encoding="utf-8"))
     values = {}
-    parameters = apparatus.parameters
     for name in (*_SENSOR_PARAMETERS, _OTHER):
-        if name in parameters:
+        if name in apparatus.parameters:
             values[name] = _certified(apparatus, name)
     missing = []
     for key in missing_keys(sections, equipment):

@@ -28,8 +28,6 @@ _COUNTED_AS = {"stage_scale": "position_scale", "film_law": "model_form", "load_
 
 Item = str | Table | Picture
 Rows = list[Sequence[str]]
-Made = tuple[Sequence[str], Rows]
-"""Heads beyond those of the texts, and rows of a table."""
 
 
 class Part(NamedTuple):
@@ -55,10 +53,14 @@ def parts_of(certificate: Certificate, fields: Mapping[str, str]) -> list[Part]:
     for name, form in texts["forms"].items():
         lines = [(label, filled(text, fields)) for label, text in form.items()]
         known[name] = Table("", ("", ""), [line for line in lines if line[1]])
+    numbers = [f"({i})" for i in range(1, len(certificate.values) + 1)]
+    units = zip(numbers, certificate.values, strict=True)
+    # Beyond those of the texts.
+    heads = {"values": numbers, "budget": [f"{number} {_unit(value)}" for number, value in units]}
     for name, make in _TABLES.items():
-        heads, rows = make(certificate)
         stated = texts["tables"][name]
-        known[name] = Table(filled(stated["title"], fields), [*stated["head"], *heads], rows)
+        head = [*stated["head"], *heads.get(name, ())]
+        known[name] = Table(filled(stated["title"], fields), head, make(certificate))
     for name, draw in _FIGURES.items():
         stated = texts["figures"][name]
         known[name] = Picture(
@@ -205,7 +207,7 @@ def _share(value: CertifiedValue) -> str:
     return f"{share:g} %"
 
 
-def _values(certificate: Certificate) -> Made:
+def _values(certificate: Certificate) -> Rows:
     rows: Rows = []
     count = len(certificate.values)
     for i, value in enumerate(certificate.values):
@@ -213,34 +215,30 @@ def _values(certificate: Certificate) -> Made:
         row += [f"{value.factor:.3g}", _share(value)]
         row += [f"{round(r, 2) + 0:.2f}" for r in certificate.correlation[i, :i]]
         rows.append([*row, "1", *[""] * (count - i - 1)])
-    return [f"({i + 1})" for i in range(count)], rows
+    return rows
 
 
-def _others(certificate: Certificate) -> Made:
-    rows: Rows = [
-        (_name(certificate, v), _measured(v), f"{v.factor:.3g}") for v in certificate.others
-    ]
-    return (), rows
+def _others(certificate: Certificate) -> Rows:
+    return [(_name(certificate, v), _measured(v), f"{v.factor:.3g}") for v in certificate.others]
 
 
-def _profile(certificate: Certificate) -> Made:
+def _profile(certificate: Certificate) -> Rows:
     r, g, covariance = certificate.profile
     expanded = COVERAGE_FACTOR * np.sqrt(np.diag(covariance))
-    rows: Rows = [
+    return [
         [f"{radius:.4g}", format_measured(value, u)]
         for radius, value, u in zip(r / MM, g / PER_MM2, expanded / PER_MM2, strict=True)
     ]
-    return (), rows
 
 
-def _equipment(certificate: Certificate) -> Made:
+def _equipment(certificate: Certificate) -> Rows:
     rows: Rows = []
     for item in certificate.equipment:
         kind = certificate.words("kinds", item.get("kind", ""))
         rows.append(
             [kind, *(item.get(key) or "" for key in ("name", "serial", "certificate", "date"))]
         )
-    return (), rows
+    return rows
 
 
 def assumption_rows(certificate: Certificate) -> Rows:
@@ -259,10 +257,9 @@ def assumption_rows(certificate: Certificate) -> Rows:
     return rows
 
 
-def _budget(certificate: Certificate) -> Made:
+def _budget(certificate: Certificate) -> Rows:
     """Return contributions to u of each value, in the unit of its last digits."""
-    heads = [f"({i}) {_unit(value)}" for i, value in enumerate(certificate.values, start=1)]
-    return heads, _contributions(certificate)[0]
+    return _contributions(certificate)[0]
 
 
 def _unit(value: CertifiedValue) -> str:
@@ -304,7 +301,7 @@ def _digits(value: CertifiedValue) -> tuple[int, int]:
     return len(spread.partition(".")[2]), power
 
 
-def _conformity(certificate: Certificate) -> Made:
+def _conformity(certificate: Certificate) -> Rows:
     rows: Rows = []
     for item in certificate.conformity:
         value = item.certified
@@ -318,7 +315,7 @@ def _conformity(certificate: Certificate) -> Made:
         row = [f"{_name(certificate, value)} ({_unit(value) or '1'})", y]
         row += [f"{lower} – {upper}", f"{lowest} – {highest}", _percent(item.probability)]
         rows.append([*row, certificate.words("statements", item.statement)])
-    return (), rows
+    return rows
 
 
 def _percent(probability: float) -> str:
@@ -340,9 +337,9 @@ def scan_figure(apparatus: ApparatusFunction) -> Figure:
     return figure
 
 
-_TABLES: Mapping[str, Callable[[Certificate], Made]] = {
+_TABLES: Mapping[str, Callable[[Certificate], Rows]] = {
     "equipment": _equipment,
-    "assumptions": lambda certificate: ((), assumption_rows(certificate)),
+    "assumptions": assumption_rows,
     "values": _values,
     "profile": _profile,
     "budget": _budget,

@@ -365,8 +365,7 @@ def read_fleet(results: Path) -> FleetResults:
             f"{results} holds no results of a batch.",
             cure="Give the folder that memscal batch -o wrote.",
         )
-    pa = arrow()
-    table = pa.concat_tables([read_shard(shard, _SUMMARISED) for shard in shards])
+    table = arrow().concat_tables([read_shard(shard, _SUMMARISED) for shard in shards])
     words = {name: table[name].to_pylist() for name in _WORDS}
     paths = words["path"]
     units = sorted(set(words["unit"]) - {None})

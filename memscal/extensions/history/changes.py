@@ -209,8 +209,7 @@ def exceeded_after(
     total = covariance + trend.scatter[0] ** 2 * np.eye(len(years))
     since = years - years[0]
     walk = np.minimum.outer(since, since)
-    own = own_variance(columns, covariance) / span
-    sizes = np.sqrt(own) * _SCATTERS
+    sizes = np.sqrt(own_variance(columns, covariance) / span) * _SCATTERS
     fits = [_least_squares(columns, total + size**2 * walk, history) for size in sizes]
     slopes, errors, likelihood, _ = map(np.ravel, zip(*fits, strict=True))
     weights = np.exp(likelihood - likelihood.max())

@@ -368,13 +368,9 @@ def _repairs(
     """Yield each repair, the last calibration before it, and how A differs after it."""
     for i, date in enumerate(repaired):
         around = np.flatnonzero((segment == i) | (segment == i + 1))
-        after = floats(segment[around] > i)
-        fit = fitted(
-            values[around],
-            np.ones((around.size, 1)),
-            after,
-            covariance[np.ix_(around, around)],
-        )
+        ones = np.ones((around.size, 1))
+        own = covariance[np.ix_(around, around)]
+        fit = fitted(values[around], ones, floats(segment[around] > i), own)
         before = np.flatnonzero(segment <= i)
         last = read[before[-1]].start_time if before.size else None
         change = fit.stated("1") if fit else None

@@ -67,9 +67,8 @@ class MovingModel(ForwardModel):
         axis = _axes(whole)
         positions[axis, np.arange(axis.size)] = np.concatenate([line.x for line in lines])
         x, y = positions
-        one = np.ones_like(x)
-        own = {"averaging": 0 * points.averaging, "velocity": 0 * x}
-        return forward_model(replace(whole, x=x, y=y, load=one, **own), self.references)
+        own = {"averaging": 0 * points.averaging, "velocity": 0 * x, "load": np.ones_like(x)}
+        return forward_model(replace(whole, x=x, y=y, **own), self.references)
 
     def geometry(self, centres: FloatArray) -> Geometry:
         """Return that of the still sensor on the grids."""

@@ -117,7 +117,6 @@ def sliding_family(setting: Values) -> ProfileFamily:
         weights=np.tile(round_nodes.weights, _ORDERS),
         line=step * np.arange(-half, half + 1),
     )
-    values = np.array(FRICTIONS)
     paths = [SlidingPath(**vars(setup.path(friction=mu, loading=SLIDING))) for mu in FRICTIONS]
-    solved = setup.family(paths, name=SLIDING, loading=SLIDING, values=values)
+    solved = setup.family(paths, name=SLIDING, loading=SLIDING, values=np.array(FRICTIONS))
     return replace(solved, scale=_SCALE, interpolation="CubicSpline")

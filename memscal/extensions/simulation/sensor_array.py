@@ -33,8 +33,7 @@ class SimulatedArray:
     @property
     def stated(self) -> Values:
         """What a scan states of them."""
-        layout = self.layout
-        return {"sensors": self.sensors, "layout": layout, "layout_uncertainty": MISPLACED}
+        return {"sensors": self.sensors, "layout": self.layout, "layout_uncertainty": MISPLACED}
 
     def read(self, stresses: FloatArray) -> FloatArray:
         """Return what sensors read of their stresses, (n, ...), over the nominal constant."""
