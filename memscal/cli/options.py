@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -73,23 +73,18 @@ def si(value: float, power: int) -> float:
     return float(Decimal(repr(value)).scaleb(power))
 
 
+@dataclass(eq=False)
 class Quantity(click.ParamType):  # type: ignore[type-arg] # generic since click 8.2 only
     """A finite number in a unit, the name of the value; it becomes one in SI units."""
 
-    def __init__(
-        self,
-        unit: str,
-        *,
-        low: float = 0.0,
-        high: float = math.inf,
-        open_low: bool = True,
-        infinite: bool = False,
-    ) -> None:
-        self.name = unit
-        self.low = low
-        self.high = high
-        self.open_low = open_low
-        self.infinite = infinite
+    unit: str
+    low: float = 0.0
+    high: float = math.inf
+    open_low: bool = True
+    infinite: bool = False
+
+    def __post_init__(self) -> None:
+        self.name = self.unit
 
     def convert(
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
