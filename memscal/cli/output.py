@@ -286,7 +286,7 @@ def rendered(draw: Callable[[], Figure], paths: Sequence[Path]) -> dict[Path, by
 
 def reported(result: Told, path: Path | None) -> dict[Path, bytes]:
     """Return a result's page as the bytes of its file, if one is asked for."""
-    return {} if path is None else {path: result.report().encode("utf-8")}
+    return {} if path is None else {path: result.report().encode()}
 
 
 def drawn(

@@ -4,7 +4,6 @@ Names stand as text, so that reading the table loads no extension.  The core cal
 it by a hook, and never imports it; an extension is one folder here, and its lines in this table.
 """
 
-from collections.abc import Callable
 from importlib import import_module
 from typing import Any
 
@@ -163,7 +162,6 @@ def module(name: str) -> Any:
     return import_module(f"memscal.{name}")
 
 
-def hook(name: str) -> Callable[..., Any]:
+def hook(name: str) -> Any:
     """Import a function that the table names."""
-    function: Callable[..., Any] = getattr(module(HOOKS[name]), name)
-    return function
+    return getattr(module(HOOKS[name]), name)

@@ -200,7 +200,7 @@ def certify(
     apparatus.require_pascals()
     sections, equipment = _completed(apparatus, laboratory)
     language = sections["certificate"].get("language", "en")
-    texts = tomllib.loads((TEXTS / f"{language}.toml").read_text(encoding="utf-8"))
+    texts = tomllib.loads((TEXTS / f"{language}.toml").read_text("utf-8"))
     values = {}
     for name in (*_SENSOR_PARAMETERS, _OTHER):
         if name in apparatus.parameters:

@@ -65,7 +65,7 @@ def command(
         with out.working("Drawing"):
             page = page_of(certificate)
             if ".html" in forms:
-                made[".html"] = certificate_page(page).encode("utf-8")
+                made[".html"] = certificate_page(page).encode()
             if ".pdf" in forms:
                 made[".pdf"] = certificate_pdf(page, made[".xml"])
     out.write_files({path: made[path.suffix.lower()] for path in outputs}, force=force)

@@ -8,6 +8,7 @@ from typing import Any
 from xml.etree import ElementTree as ET
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.special import chdtri
 
 from memscal.extensions.certificate.certificate import (
@@ -18,7 +19,7 @@ from memscal.extensions.certificate.certificate import (
 )
 from memscal.extensions.certificate.content import assumption_rows, fields_of, filled
 from memscal.formats.units import dsi_unit
-from memscal.model.arrays import FloatArray, Values
+from memscal.model.arrays import FloatArray, Values, floats
 from memscal.model.quantities import DIMENSIONS, PER_MM
 from memscal.version import __version__
 
@@ -118,8 +119,8 @@ def _real(value: float, unit: str) -> Tree:
     return {"si:value": _numbers(value), "si:unit": dsi_unit(unit)}
 
 
-def _numbers(values: float | Iterable[float] | FloatArray) -> str:
-    numbers = np.atleast_1d(np.asarray(values, dtype=np.float64)).tolist()
+def _numbers(values: ArrayLike) -> str:
+    numbers = floats(values).ravel().tolist()
     return " ".join(repr(number) if np.isfinite(number) else "NaN" for number in numbers)
 
 

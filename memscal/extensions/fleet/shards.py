@@ -144,7 +144,7 @@ def arrow() -> Any:
 
 def _schema(readings: Iterable[Reading]) -> Any:
     """Return names, types and units of the columns, for sensors with readings in some units."""
-    stated = json.loads(_COLUMNS.read_text(encoding="utf-8"))
+    stated = json.loads(_COLUMNS.read_text("utf-8"))
     for parameter in _PARAMETERS:
         units = {ESTIMATED[parameter].read_in(reading).unit_text for reading in readings}
         for name in (parameter, f"{parameter}_errors"):
