@@ -1,6 +1,6 @@
 """What stands in a certificate, in the words of its language: texts, tables and figures."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from functools import partial
 from string import Template
@@ -83,14 +83,14 @@ def parts_of(certificate: Certificate, fields: Mapping[str, str]) -> list[Part]:
 def fields_of(certificate: Certificate) -> dict[str, str]:
     """Return what is filled into the texts, by name; what is not known is not in it."""
     texts = certificate.texts
-    fields: dict[str, str] = dict(texts["defaults"])
+    fields = dict(texts["defaults"])
     for section, stated in certificate.sections.items():
         for key, value in stated.items():
             if isinstance(value, str) and value:
                 fields[f"{section}_{key}"] = value
     fields |= _of_conditions(certificate) | _of_calibration(certificate)
     shown = {item.get("kind") for item in certificate.equipment}
-    lists: dict[str, list[str]] = {
+    lists = {
         "traceable": [],
         "untraceable": [],
         "missing": [item.words for item in certificate.missing],
@@ -282,7 +282,7 @@ def _contributions(certificate: Certificate) -> tuple[Rows, list[str]]:
         totals.append(f"{total_of(budget) / unit:.{places}f}" if budget else "")
         for source, u in budget.items():
             sizes[source] = max(sizes.get(source, 0.0), abs(u) / value.uncertainty)
-    rows: Rows = []
+    rows = []
     negligible = []
     for source in sorted(sizes, key=lambda source: -sizes[source]):
         words = certificate.words("sources", source)
@@ -337,7 +337,7 @@ def scan_figure(apparatus: ApparatusFunction) -> Figure:
     return figure
 
 
-_TABLES: Mapping[str, Callable[[Certificate], Rows]] = {
+_TABLES = {
     "equipment": _equipment,
     "assumptions": assumption_rows,
     "values": _values,

@@ -57,7 +57,7 @@ def read_recipe(context: click.Context, path: Path) -> None:
         problem = f"{path.name} is no TOML: {error}."
         raise FormatError(problem, cure="memscal import --save-recipe writes one.") from error
     options = {option.name: option for option in context.command.params}
-    stated: Options = {}
+    stated = {}
     for section, entries in content.items():
         for key, value in entries.items() if isinstance(entries, dict) else [(section, entries)]:
             try:

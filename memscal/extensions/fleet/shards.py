@@ -72,21 +72,17 @@ def manifest_scans(
         yield from (FleetScan(relative(path, source.parent)) for path in sources)
         return
     if source.is_dir():
-        yield from _folder_scans(source, suffixes)
+        for place, folders, files in os.walk(source):
+            folders.sort()
+            for path in (Path(place, name) for name in sorted(files)):
+                if path.suffix.lower() in suffixes and not path.stem.endswith(_RESULTS):
+                    yield FleetScan(path.relative_to(source).as_posix())
         return
     try:
         lines = read_bytes(source).decode("utf-8-sig").splitlines()
         yield from _listed_scans(source.name, lines)
     except (UnicodeDecodeError, csv.Error) as error:
         raise FormatError(f"{source} is not a table of text: {error}.") from error
-
-
-def _folder_scans(folder: Path, suffixes: tuple[str, ...]) -> Iterator[FleetScan]:
-    for place, folders, files in os.walk(folder):
-        folders.sort()
-        for path in (Path(place, name) for name in sorted(files)):
-            if path.suffix.lower() in suffixes and not path.stem.endswith(_RESULTS):
-                yield FleetScan(path.relative_to(folder).as_posix())
 
 
 def _listed_scans(name: str, lines: Iterable[str]) -> Iterator[FleetScan]:

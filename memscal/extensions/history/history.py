@@ -231,7 +231,7 @@ def history(
     own = covariances[:, tested[:, None], tested]
     since = years[tested]
     marked = [marks[i] for i in tested]
-    tests: list[Values] = []
+    tests = []
     for i, share in enumerate(_SHARES):
         found = change_tests(values[i, tested], base, own[i], since, marked, share * LEVEL)
         for test, result in found.items():
@@ -344,7 +344,7 @@ def _quantities(
     with_sigma = np.sum(within * joint[0, 1]) / np.sum(within * joint[1, 1])
     rows = np.insert(np.eye(len(values)), 2, 0.0, axis=0)
     rows[2, :2] = 1.0, -with_sigma
-    covariances: FloatArray = np.einsum("aq,ap,qpij->aij", rows, rows, joint)
+    covariances = np.einsum("aq,ap,qpij->aij", rows, rows, joint)
     transfers = (f"A G({number / PER_MM:g} rad/mm)" for number in k)
     names = ("A", "sigma", "A at unchanged sigma", *transfers)
     return names, rows @ (values - values[:, :1]), covariances

@@ -184,7 +184,7 @@ _MAX_NOTES = 4000
 
 def is_mesh(path: FilePath) -> bool:
     """Return whether a file's name says that it is a mesh and not a table."""
-    ending = os.path.splitext(os.fspath(path))[1].lower()
+    ending = Path(path).suffix.lower()
     return ending in _KINDS or ending in _OTHERS
 
 
@@ -227,9 +227,8 @@ class Mesh:
 
 def read_mesh(path: FilePath) -> Mesh:
     """Read a mesh and its fields from a VTU, legacy VTK or XDMF file."""
-    shown = os.fspath(path)
-    name = os.path.basename(shown)
-    kind = _KINDS.get(os.path.splitext(shown)[1].lower())
+    name = Path(path).name
+    kind = _KINDS.get(Path(path).suffix.lower())
     if kind is None:
         raise FormatError(
             f"{name} is not a mesh of a kind that is read.",
@@ -238,13 +237,13 @@ def read_mesh(path: FilePath) -> Mesh:
             "stress at the base as a table (CSV).",
         )
     installed("meshio", "A mesh", "fem-io")
-    data = read_bytes(shown)
+    data = read_bytes(path)
     if not data:
         raise FormatError(f"{name} is empty.", cure="Save the mesh again.")
     sources = [SourceFile(name, hashlib.sha256(data).hexdigest())]
     heavy: ByName = {}
     if kind == "xdmf":
-        heavy, drawn = heavy_arrays(data, shown)
+        heavy, drawn = heavy_arrays(data, os.fspath(path))
         sources += drawn
     with damage_named(f"{name} cannot be read as a mesh", why="Its reader gave no mesh back"):
         header, arrays = run_meshio(data, kind, name, heavy)

@@ -291,7 +291,7 @@ def _points(
                 why="Friction shifts the stress ahead of the indenter.",
                 cure="State it (/entry/data/direction): memscal import --sliding forth or back.",
             )
-        own: Values = {
+        own = {
             "offset": single.offset + centres[i] - middle,
             # Outliers were told by a round stress.
             "noise": profile.points["zz"].noise,

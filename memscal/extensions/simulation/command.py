@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from inspect import signature
 from itertools import chain
@@ -137,7 +137,7 @@ def _print_truth(scans: Mapping[Path, Scan], title: str) -> None:
 
     truths = [dict(scan.synthetic or {}) for scan in scans.values()]
     names = dict.fromkeys(chain(*sorted(truths, key=len, reverse=True)))
-    rows: list[Sequence[str]] = [
+    rows = [
         ("kind", *(scan.kind for scan in scans.values())),
         ("points", *(" x ".join(map(str, scan.u_zz.shape)) for scan in scans.values())),
     ]

@@ -63,7 +63,7 @@ def simulated_array(
     require_positive("pitch", pitch, "m")
     require_range("crosstalk", crosstalk, -0.5, 0.5)
     y, x = np.mgrid[:rows, :columns]
-    layout = pitch * np.stack([x.ravel(), y.ravel()], axis=1)
+    layout = pitch * np.column_stack([x.ravel(), y.ravel()])
     layout -= layout.mean(axis=0)
     rng = np.random.default_rng([seed, 2])
     apart = np.hypot(*(layout[:, None] - layout).T)
