@@ -237,10 +237,10 @@ def _named_figures(options: Options, lubrications: Iterable[str]) -> dict[str, P
     return {stem: folder / f"{stem}.{options['figure_format']}" for stem in stems}
 
 
-def _drawn(comparison: FrictionComparison, named: Mapping[str, Path]) -> dict[Path, bytes]:
+def _drawn(comparison: FrictionComparison, named: Mapping[str, Path]) -> out.Files:
     from memscal.figures.friction import comparison_figures
 
-    files: dict[Path, bytes] = {}
+    files: out.Files = {}
     with out.working("Drawing"):
         for stem, draw in comparison_figures(comparison).items():
             files |= out.rendered(draw, [named[stem]])

@@ -2,6 +2,7 @@
 
 import re
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -42,11 +43,10 @@ def _tolerance(*given: str) -> float:
 def command(
     artifacts: tuple[Path, ...],
     output: Path | None,
-    tolerance: float,
-    repairs: tuple[str, ...],
     figures: tuple[Path, ...],
     as_json: bool,
     force: bool,
+    **options: Any,
 ) -> int:
     """Say whether a sensor has changed between its calibrations, and when the next one is due.
 
@@ -57,7 +57,7 @@ def command(
     from memscal.extensions.history.history import history
 
     out.prove_writable([output, *figures], force=force, inputs=artifacts)
-    found = history(artifacts, tolerance=tolerance, repairs=repairs)
+    found = history(artifacts, **options)
     files = out.drawn(found, figures, output)
     with together():
         out.write_files(files, force=force)

@@ -34,6 +34,9 @@ from memscal.model.quantities import PER_MM
 from memscal.model.result import Shown
 from memscal.summaries.table import percent
 
+Calibrations = Sequence[ApparatusFunction]
+"""Artifacts of one sensor by their dates."""
+
 _DAYS = 365.25
 FEWEST = 4
 """Dates below which no date of the next calibration is proposed."""
@@ -308,7 +311,7 @@ def moment_of(text: str) -> datetime:
     return moment.replace(tzinfo=moment.tzinfo or UTC).astimezone(UTC)
 
 
-def _require_one_sensor(read: Sequence[ApparatusFunction]) -> None:
+def _require_one_sensor(read: Calibrations) -> None:
     """Refuse artifacts that do not measure the same quantity with one sensor."""
     if len(read) < 2:
         raise InputError(
@@ -333,7 +336,7 @@ def _require_one_sensor(read: Sequence[ApparatusFunction]) -> None:
 
 
 def _quantities(
-    read: Sequence[ApparatusFunction],
+    read: Calibrations,
 ) -> tuple[tuple[str, ...], FloatArray, FloatArray]:
     """Return names, logarithms (q, n) less the first date's, and covariances (q, n, n)."""
     k = shared.common_wavenumbers(read)
@@ -350,7 +353,7 @@ def _quantities(
     return names, rows @ (values - values[:, :1]), covariances
 
 
-def _temperatures(read: Sequence[ApparatusFunction]) -> FloatArray | None:
+def _temperatures(read: Calibrations) -> FloatArray | None:
     """Return temperatures less their mean, in K, where they differ and all dates state one."""
     stated = [one.sensor.temperature for one in read if one.sensor.temperature is not None]
     if len(stated) < max(len(read), FEWEST) or np.ptp(stated) < _LEAST_SPREAD:
@@ -360,7 +363,7 @@ def _temperatures(read: Sequence[ApparatusFunction]) -> FloatArray | None:
 
 def _repairs(
     repaired: Sequence[str],
-    read: Sequence[ApparatusFunction],
+    read: Calibrations,
     segment: IndexArray,
     values: FloatArray,
     covariance: FloatArray,
@@ -377,7 +380,7 @@ def _repairs(
         yield {"date": date, "last_before": last, "change": change}
 
 
-def _messages(read: Sequence[ApparatusFunction]) -> Iterator[Message]:
+def _messages(read: Calibrations) -> Iterator[Message]:
     """Yield what weakens the history, and what would mend it."""
     numbered = [one.sensor.serial_number for one in read]
     failed = "failed a quality check."

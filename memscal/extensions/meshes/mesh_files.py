@@ -51,6 +51,8 @@ _HDF5_ENDINGS = (".h5", ".hdf5", ".hdf")
 _ADDRESS = re.compile(rb"<DataItem\b[^<>]{0,1000}>\s{0,200}([^<>:]{0,200}):([^<>]{1,500})<")
 ByName = dict[str, NDArray[Any]]
 """Arrays of a mesh file by their names."""
+Numbers = list[NDArray[Any]]
+"""The same by the numbers that a header gives them."""
 
 _AS_VTU = (
     "Save it from ParaView as an unstructured grid (.vtu) in one piece, of data mode ASCII or "
@@ -97,9 +99,7 @@ def heavy_arrays(data: bytes, path: str) -> tuple[ByName, list[SourceFile]]:
     return arrays, [file.source for file in files.values()]
 
 
-def run_meshio(
-    data: bytes, kind: str, name: str, heavy: ByName
-) -> tuple[Values, list[NDArray[Any]]]:
+def run_meshio(data: bytes, kind: str, name: str, heavy: ByName) -> tuple[Values, Numbers]:
     """Return what meshio makes of a mesh: a header, and the arrays that it numbers."""
     size = len(data) + sum(values.nbytes for values in heavy.values())
     seconds = _SECONDS + size / _BYTES_PER_SECOND
@@ -252,7 +252,7 @@ def read_mesh(path: FilePath) -> Mesh:
 
 def _checked(
     header: Values,
-    arrays: list[NDArray[Any]],
+    arrays: Numbers,
     sources: tuple[SourceFile, ...],
     *,
     tensor_order: bool,
@@ -279,7 +279,7 @@ def _checked(
 
 
 def _cells(
-    blocks: list[Values], arrays: list[NDArray[Any]], points: int, source: SourceFile
+    blocks: list[Values], arrays: Numbers, points: int, source: SourceFile
 ) -> Iterator[Cells]:
     """Yield the blocks that have cells, with their nodes as whole numbers below ``points``."""
     for block in blocks:

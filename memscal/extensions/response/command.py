@@ -2,6 +2,7 @@
 
 import math
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -45,12 +46,10 @@ def command(
     artifact: Path,
     wavelengths: tuple[float, ...],
     speeds: tuple[float, ...],
-    friction: float,
-    noise_record: Path | None,
-    length: float | None,
     figures: tuple[Path, ...],
     as_json: bool,
     force: bool,
+    **options: Any,
 ) -> None:
     """Find what a calibrated sensor (ARTIFACT) reads of waves of pressure on its film.
 
@@ -58,17 +57,10 @@ def command(
     calibration does not resolve has none. With a noise record, a speed and a length, the smallest
     amplitude is found that is seen at three standard uncertainties.
     """
-    out.prove_writable(figures, force=force, inputs=[artifact, noise_record])
+    out.prove_writable(figures, force=force, inputs=[artifact, options["noise_record"]])
     from memscal.extensions.response.response import response
 
-    seen = response(
-        artifact,
-        wavelengths,
-        speeds or None,
-        friction=friction,
-        noise_record=noise_record,
-        length=length,
-    )
+    seen = response(artifact, wavelengths, speeds or None, **options)
     files = out.drawn(seen, figures)
     with together():
         out.write_files(files, force=force)
