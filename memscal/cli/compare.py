@@ -18,6 +18,7 @@ from memscal.cli.options import (
     artifact_argument,
     contact_options,
     figure_option,
+    flag,
     option,
     report_options,
     scans_argument,
@@ -84,7 +85,7 @@ Examples:
     "wherever it is touched); between them profiles are interpolated. Repeated: several.  "
     "[default: nine between 0 and inf]"
 )
-@option("--loading loadings", click.Choice(["incremental", "total"]), multiple=True)(
+@option("--loading loadings", ["incremental", "total"], multiple=True)(
     "A point sticks where it first touched (incremental), or as if loaded in one step "
     "(total). May be repeated.  [default: both]"
 )
@@ -92,7 +93,7 @@ Examples:
     "Profiles calculated elsewhere (memscal-reference), in place of memscal's: one file for "
     "each load and friction coefficient. Repeated."
 )
-@option("--lubricated", click.Choice(["frictionless", "apart"]))(
+@option("--lubricated", ["frictionless", "apart"])(
     "Fit lubricated loads with no friction (--lubricated-friction 0) together with the dry ones, "
     "or each kind by itself.  [default: together]"
 )
@@ -113,15 +114,15 @@ Examples:
 @option("--macroscopic-uncertainty", NonNegative("ratio"), metavar="U")(
     "Standard uncertainty (k = 1) of --macroscopic."
 )
-@option("--channel", click.Choice(["zz", "xz", "yz"]), "zz")(
+@option("--channel", ["zz", "xz", "yz"], "zz")(
     "xz or yz: compare the shear that a tangential channel measured, by its own ARTIFACT, with the "
     "points of one STRESS file (experimental)."
 )
-@option("--interface", is_flag=True)(
+@flag("--interface")(
     "Also explain the profiles by an interface that yields before it slips, at the "
     "macroscopic friction, and report which of the two explanations is more likely."
 )
-@option("--sliding", is_flag=True)(
+@flag("--sliding")(
     "Compare scans of a sphere that slid (/entry/indenter/motion) with contacts that slide."
 )
 @option("--backlash", NonNegative("um"))(
@@ -133,13 +134,13 @@ Examples:
     "Where calculated contacts are kept for the next run.  [default: memscal/contacts in "
     "the user's cache folder]"
 )
-@option("--no-cache", is_flag=True)("Calculate all contacts, and store none.")
+@flag("--no-cache")("Calculate all contacts, and store none.")
 @figure_option("Draw profiles, residuals, maxima and friction coefficients on one page.")
 @option("--figures folder", FILE, metavar="FOLDER")(
     "Draw each figure into a file of its own in this folder: profiles, profiles for a set of "
     "coefficients, maxima, effective friction, likelihood, interface."
 )
-@option("--figure-format", click.Choice(_FORMATS), "png")("Format of --figures.")
+@option("--figure-format", _FORMATS, "png")("Format of --figures.")
 @report_options
 def command(
     artifact: Path, scans: tuple[Path, ...], as_json: bool, force: bool, **options: Any

@@ -125,11 +125,17 @@ def option(
     names: str, kind: Any = None, default: Any = None, **settings: Any
 ) -> Callable[[str], _Adder]:
     """Return what makes an option of its help text; blanks part its names."""
-    # A kind that is a text is the name of the value, which is then any text.
+    # A kind that is a text is the name of the value, which is then any text; a list is of choices.
+    if isinstance(kind, list):
+        kind = click.Choice(kind)
     settings |= {"metavar": kind} if isinstance(kind, str) else {"type": kind}
     if default is not None:
         settings = {"default": default, "show_default": True} | settings
     return lambda about: click.option(*names.split(), help=about, **settings)
+
+
+flag = partial(option, is_flag=True)
+"""An option without a value."""
 
 
 def options_of(*options: _Adder) -> _Adder:
@@ -161,7 +167,7 @@ def _declared(
     if number:
         value = Quantity(**number)
     elif choices:
-        value = click.Choice(choices)
+        value = choices
     return option(names, value, **settings)(about)
 
 
@@ -197,20 +203,20 @@ def _one_form(ctx: click.Context, param: click.Parameter, given: bool) -> bool:
     return given
 
 
-json_option = option("--json as_json", is_flag=True, callback=_one_form)(
+json_option = flag("--json as_json", callback=_one_form)(
     "Print one JSON object in place of tables."
 )
-brief_option = option("--brief", is_flag=True, callback=_one_form)(
+brief_option = flag("--brief", callback=_one_form)(
     "Print the first lines only, which say what was found."
 )
-force_option = option("--force", is_flag=True)("Replace outputs that exist.")
+force_option = flag("--force")("Replace outputs that exist.")
 report_option = option("--report", FILE, metavar="FILE.html")(
     "Write a report as one HTML page, without other files, network or scripts."
 )
-override_option = option("--override", is_flag=True)(
+override_option = flag("--override")(
     "Go on although sensor, channel or film of artifact and scan differ: recorded in the output."
 )
-accept_altered_option = option("--accept-altered", is_flag=True)(
+accept_altered_option = flag("--accept-altered")(
     "Use files although their content does not fit their digest: recorded in the output."
 )
 noise_record_option = option("--noise-record", FILE)(
@@ -272,7 +278,7 @@ def film_options(*, defaults: Defaults = _NO_DEFAULTS, uncertainties: bool = Tru
     )
     return options_of(
         _measured(entries, defaults, uncertainties),
-        option("--film-law", click.Choice(FILM_LAWS), defaults.get("film-law"))(
+        option("--film-law", [*FILM_LAWS], defaults.get("film-law"))(
             "Law of the film's stress: small strain, or rubber."
         ),
         option("--mooney-rivlin-ratio", NonNegative("ratio"))(
@@ -283,7 +289,7 @@ def film_options(*, defaults: Defaults = _NO_DEFAULTS, uncertainties: bool = Tru
 
 rod_friction_option = option(
     "--rod-friction",
-    click.Choice(["0", "inf"]),
+    ["0", "inf"],
     callback=lambda _, __, text: None if text is None else float(text),
 )
 FREE_OR_STUCK = "Rod: 0, the film slides freely under it; inf, it sticks."

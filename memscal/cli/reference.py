@@ -138,15 +138,15 @@ Examples:
     "Friction coefficient between indenter and film; inf: it sticks wherever it touches.  "
     "[default: 0; inf of a rod on a film that is not linear]"
 )
-@option("--loading", click.Choice(["incremental", "total"]), "incremental")(
+@option("--loading", ["incremental", "total"], "incremental")(
     "A point sticks where it first touched, or as if loaded in one step. The same under a rod."
 )
 @interface_options
 @film_options(defaults={**PAPER, "film-law": None}, uncertainties=False)
-@option("--backend", click.Choice(["hankel", "fem"]), "hankel")(
+@option("--backend", ["hankel", "fem"], "hankel")(
     "Hankel transforms on an infinite film, or finite elements on one with a free edge."
 )
-@option("--strain", click.Choice(["linear", "finite"]))(
+@option("--strain", ["linear", "finite"])(
     "finite: --film-law neo-hookean, unless another is given; linear: --film-law linear."
 )
 @option("--film-radius", Quantity("mm"))(

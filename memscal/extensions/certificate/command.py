@@ -6,7 +6,7 @@ import click
 
 from memscal.cli import output as out
 from memscal.cli.failures import exit_code_of
-from memscal.cli.options import FILE, artifact_argument, option, output_options
+from memscal.cli.options import FILE, artifact_argument, flag, option, output_options
 from memscal.summaries.table import Table
 
 EXAMPLES = """\b
@@ -31,9 +31,7 @@ _FORM = out.FigurePath((".html", ".pdf", ".xml"))
     "Certificate to write: a page, a tagged PDF/A-3 that holds the XML, or a Digital Calibration "
     "Certificate (DCC). May be repeated."
 )
-@option("--incomplete", is_flag=True)(
-    "Write a certificate that says what it lacks, and states no conformity."
-)
+@flag("--incomplete")("Write a certificate that says what it lacks, and states no conformity.")
 @output_options
 def command(
     artifact: Path,

@@ -91,7 +91,7 @@ def _target(value: str) -> tuple[str, float]:
     "What to reach by --vary: A=1%, sigma=1% or fwhm=5% at most, relative standard "
     "uncertainty, or resolved=4 at least, in rad/mm. Repeated: all are to be reached."
 )
-@option("--vary", click.Choice(("step", "half-range", "repeats")))(
+@option("--vary", ["step", "half-range", "repeats"])(
     "What to vary for --want: the coarsest step, shortest range or fewest repeats is found."
 )
 @figure_option("Draw the expected result.")

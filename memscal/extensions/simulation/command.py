@@ -24,6 +24,7 @@ from memscal.cli.options import (
     Quantity,
     film_from,
     film_options,
+    flag,
     indenter_from,
     kernel_from,
     kernel_options,
@@ -75,7 +76,7 @@ _sphere_options = options_of(
     option("--friction", NonNegative("ratio", infinite=True), 0.2, metavar="MU")(
         "Sphere: friction coefficient of the dry contacts; inf: they stick wherever they touch."
     ),
-    option("--loading", click.Choice(["incremental", "total"]), "incremental")(
+    option("--loading", ["incremental", "total"], "incremental")(
         "Sphere: a point sticks where it first touched, or as if loaded in one step."
     ),
     interface_options,
@@ -84,18 +85,18 @@ _sphere_options = options_of(
     option("--load-scatter", NonNegative("percent", high=10.0), 2.0)(
         "Sphere: standard deviation of each contact's own load, in percent."
     ),
-    option("--record-loads", is_flag=True)(
+    flag("--record-loads")(
         "Sphere: record the load that each contact had, read to 0.2 percent, in place of "
         "the nominal one."
     ),
     option("--position-error", NonNegative("um"), 10.0)(
         "Sphere: standard deviation of each contact's own position, in um."
     ),
-    option("--draw-inputs", is_flag=True)(
+    flag("--draw-inputs")(
         "Sphere: draw the true film, radii and loads from their uncertainties; the files "
         "state the nominal ones, and the truth beside."
     ),
-    option("--one-load-cell", is_flag=True)(
+    flag("--one-load-cell")(
         "Sphere: its loads and the rod's have one common error, and the scans name one load cell."
     ),
     option("--gain", Quantity("ratio"), 1.0)(
@@ -219,7 +220,7 @@ Examples of an experiment: a rod scan to calibrate with, and a sphere's contacts
 
 
 @click.command("simulate", epilog=EXAMPLES)
-@option("--experiment", click.Choice(["rod", "sphere"]), "rod")(
+@option("--experiment", ["rod", "sphere"], "rod")(
     "A rod scan; or a whole experiment with a sphere: a rod scan, and scans of the sphere's "
     "contacts, dry and lubricated."
 )
@@ -246,7 +247,7 @@ Examples of an experiment: a rod scan to calibrate with, and a sphere's contacts
 @option("--repeats", click.IntRange(min=1, max=4096), 1)(
     "Repeats at each load; with a sphere, of its contacts."
 )
-@option("--raster", is_flag=True)(
+@flag("--raster")(
     "Rod scan alone: a square instead of a line, as several rows of sensors always are."
 )
 @option("--array", "ROWSxCOLUMNS", callback=_rows_and_columns)(
