@@ -30,6 +30,7 @@ from memscal.cli.options import (
     option,
     options_of,
     out_option,
+    repeatable,
     report_option,
     rod_friction_option,
     scans_argument,
@@ -164,7 +165,7 @@ calibration_options = options_of(
         "Whether the film slides freely under the rod (0) or sticks (inf), which matters at finite"
         " strain. By default as the scan states it; else midway, and the rest is counted."
     ),
-    option("--correlation correlations", multiple=True, metavar="INPUT,INPUT=R")(
+    repeatable("--correlation correlations", metavar="INPUT,INPUT=R")(
         "Correlation coefficient of two inputs' errors: thickness,poisson_ratio=0.5. Repeatable."
     ),
     option("--channel", ["zz", "xz", "yz"], "zz")(
@@ -182,7 +183,7 @@ calibration_options = options_of(
         "Whether the repeats of a scan share their centre, or each has a centre, baseline and "
         "drift of its own.  [default: per-repeat where a common centre has a p-value below 1/1000]"
     ),
-    option("--option options", multiple=True, metavar="NAME=VALUE")(
+    repeatable("--option options", metavar="NAME=VALUE")(
         "A parameter of the method, such as amplitude=0.5 (a factor on the noise amplitude that "
         "the rule chooses). May be repeated."
     ),
@@ -239,7 +240,7 @@ def calibration_settings(
     "Array: pairs whose crosstalk is estimated: of neighbours, none, or all.  [default: auto, "
     "which is nearest]"
 )
-@option("--free", ["thickness"], multiple=True)(
+@repeatable("--free", ["thickness"])(
     "Estimate the film's thickness, too, from scans with several rods, or at several loads on a "
     "film of a stated law that is not linear; the stated thickness is its prior."
 )

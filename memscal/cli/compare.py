@@ -20,6 +20,7 @@ from memscal.cli.options import (
     figure_option,
     flag,
     option,
+    repeatable,
     report_options,
     scans_argument,
 )
@@ -80,16 +81,16 @@ Examples:
 @click.command("compare", epilog=EXAMPLES)
 @artifact_argument
 @scans_argument("SCAN|STRESS...")
-@option("--friction friction", _COEFFICIENT, multiple=True, metavar="MU")(
+@repeatable("--friction friction", _COEFFICIENT, metavar="MU")(
     "Friction coefficient to calculate profiles for, beside 0 and inf (the film sticks "
     "wherever it is touched); between them profiles are interpolated. Repeated: several.  "
     "[default: nine between 0 and inf]"
 )
-@option("--loading loadings", ["incremental", "total"], multiple=True)(
+@repeatable("--loading loadings", ["incremental", "total"])(
     "A point sticks where it first touched (incremental), or as if loaded in one step "
     "(total). May be repeated.  [default: both]"
 )
-@option("--reference references", FILE, multiple=True)(
+@repeatable("--reference references", FILE)(
     "Profiles calculated elsewhere (memscal-reference), in place of memscal's: one file for "
     "each load and friction coefficient. Repeated."
 )

@@ -136,6 +136,8 @@ def option(
 
 flag = partial(option, is_flag=True)
 """An option without a value."""
+repeatable = partial(option, multiple=True)
+"""An option that may be given several times."""
 
 
 def options_of(*options: _Adder) -> _Adder:
@@ -177,7 +179,7 @@ out_option = option("-o --output", FILE, metavar="OUT")
 
 def figure_option(about: str) -> _Adder:
     """Return the option of a figure's files; the text says what is drawn."""
-    return option("--figure figures", FigurePath(), multiple=True, metavar="FILE.png|svg|pdf")(
+    return repeatable("--figure figures", FigurePath(), metavar="FILE.png|svg|pdf")(
         f"{about} May be repeated."
     )
 
@@ -360,11 +362,11 @@ def _require(subject: str, options: Options, names: Iterable[str], otherwise: st
 
 
 kernel_options = options_of(
-    option("--sigma sigmas", Quantity("um"), (561.0,), multiple=True)(
+    repeatable("--sigma sigmas", Quantity("um"), (561.0,))(
         "Standard deviation of the Gaussian apparatus function, in um. Repeated with "
         "--weight: a sum of Gaussians."
     ),
-    option("--weight weights", Quantity("ratio", low=-math.inf), multiple=True)(
+    repeatable("--weight weights", Quantity("ratio", low=-math.inf))(
         "Share of each Gaussian, in the order of --sigma; they add up to 1."
     ),
     option("--disc-radius", Quantity("um"))(

@@ -25,6 +25,7 @@ from memscal.cli.options import (
     out_option,
     output_options,
     radius_options,
+    repeatable,
 )
 from memscal.extensions import hook
 from memscal.formats.files import together
@@ -118,11 +119,11 @@ Examples:
 
 @click.command("reference", epilog=EXAMPLES)
 @click.argument("indenter", type=click.Choice(SHAPES))
-@option("--load loads", Quantity("N"), multiple=True)(
+@repeatable("--load loads", Quantity("N"))(
     "Normal load, in N. Repeated, a path: visited in the order given.  [default: 1, without "
     "--depth]"
 )
-@option("--depth depths", Quantity("um"), multiple=True)(
+@repeatable("--depth depths", Quantity("um"))(
     "Indentation depth, in um, in place of a load. May be repeated."
 )
 @radius_options("the rod or of the sphere's curvature", uncertainties=False)

@@ -6,7 +6,7 @@ import click
 
 from memscal.cli import output as out
 from memscal.cli.failures import exit_code_of
-from memscal.cli.options import FILE, artifact_argument, flag, option, output_options
+from memscal.cli.options import FILE, artifact_argument, flag, option, output_options, repeatable
 from memscal.summaries.table import Table
 
 EXAMPLES = """\b
@@ -27,7 +27,7 @@ _FORM = out.FigurePath((".html", ".pdf", ".xml"))
 @option("--lab laboratory", FILE, required=True, metavar="lab.toml")(
     "Laboratory's file: laboratory, customer, sensor, equipment, conditions, decision rule."
 )
-@option("-o --output outputs", _FORM, multiple=True, required=True, metavar="FILE.html|pdf|xml")(
+@repeatable("-o --output outputs", _FORM, required=True, metavar="FILE.html|pdf|xml")(
     "Certificate to write: a page, a tagged PDF/A-3 that holds the XML, or a Digital Calibration "
     "Certificate (DCC). May be repeated."
 )

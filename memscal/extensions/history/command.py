@@ -8,7 +8,7 @@ import click
 
 from memscal.cli import output as out
 from memscal.cli.failures import CHECK_FAILED, DONE
-from memscal.cli.options import FILE, figure_option, option, output_options
+from memscal.cli.options import FILE, figure_option, option, output_options, repeatable
 from memscal.formats.files import together
 
 EXAMPLES = """\b
@@ -35,7 +35,7 @@ def _tolerance(*given: str) -> float:
 @option("--tolerance", "A=PERCENT", "A=2%", callback=_tolerance)(
     "Change of A that is allowed until the next calibration."
 )
-@option("--repair repairs", "DATE", multiple=True)(
+@repeatable("--repair repairs", "DATE")(
     "Date of a repair, such as 2026-03-01: what is before it is shown, not tested. Repeated."
 )
 @figure_option("Draw A and sigma by date.")

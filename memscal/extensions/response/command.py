@@ -14,6 +14,7 @@ from memscal.cli.options import (
     figure_option,
     option,
     output_options,
+    repeatable,
 )
 from memscal.formats.files import together
 
@@ -27,10 +28,10 @@ Examples:
 
 @click.command("response", epilog=EXAMPLES)
 @artifact_argument
-@option("--wavelength wavelengths", Quantity("mm"), multiple=True, required=True)(
+@repeatable("--wavelength wavelengths", Quantity("mm"), required=True)(
     "Wavelength of the pressure along the film, in mm. May be repeated."
 )
-@option("--speed speeds", Quantity("mm/s"), multiple=True)(
+@repeatable("--speed speeds", Quantity("mm/s"))(
     "Speed with which it passes the sensor, in mm/s. May be repeated."
 )
 @option("--friction", Quantity("ratio", low=-math.inf), 0.0)(

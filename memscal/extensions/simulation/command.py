@@ -33,6 +33,7 @@ from memscal.cli.options import (
     options_of,
     output_options,
     radius_options,
+    repeatable,
     rod_friction_option,
     with_laboratory,
 )
@@ -66,7 +67,7 @@ def _rows_and_columns(_: Any, __: Any, text: str | None) -> tuple[int, int] | No
 
 
 _sphere_options = options_of(
-    option("--lubricated-load lubricated_loads", Quantity("N"), (0.69, 2.75), multiple=True)(
+    repeatable("--lubricated-load lubricated_loads", Quantity("N"), (0.69, 2.75))(
         "Sphere: load of the lubricated contacts, in N. May be repeated."
     ),
     option("--sphere-radius", Quantity("mm"), 128.8)("Sphere: radius of curvature, in mm."),
@@ -229,7 +230,7 @@ Examples of an experiment: a rod scan to calibrate with, and a sphere's contacts
     "[default: synthetic_scan.h5, or synthetic_experiment]"
 )
 @kernel_options
-@option("--load loads", Quantity("N"), multiple=True)(
+@repeatable("--load loads", Quantity("N"))(
     "Normal load, in N. Repeated: one scan at each.  [default: 1; of a sphere's dry contacts "
     "0.34, 0.69, 1.37 and 2.75]"
 )
