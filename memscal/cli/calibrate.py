@@ -23,6 +23,7 @@ from memscal.cli.options import (
     accept_altered_option,
     brief_option,
     figure_option,
+    files_argument,
     flag,
     force_option,
     json_option,
@@ -33,7 +34,6 @@ from memscal.cli.options import (
     repeatable,
     report_option,
     rod_friction_option,
-    scans_argument,
 )
 from memscal.extensions import hook
 from memscal.formats.files import together
@@ -227,7 +227,7 @@ def calibration_settings(
 
 
 @click.command("calibrate", epilog=EXAMPLES)
-@scans_argument()
+@files_argument()
 @out_option(
     "Artifact to write; by default SCAN.apparatus.h5 beside SCAN.h5, of an array SCAN.array.h5."
 )

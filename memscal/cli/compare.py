@@ -18,11 +18,11 @@ from memscal.cli.options import (
     artifact_argument,
     contact_options,
     figure_option,
+    files_argument,
     flag,
     option,
     repeatable,
     report_options,
-    scans_argument,
 )
 from memscal.figures import FIGURE_SUFFIXES
 from memscal.formats.files import together
@@ -80,7 +80,7 @@ Examples:
 
 @click.command("compare", epilog=EXAMPLES)
 @artifact_argument
-@scans_argument("SCAN|STRESS...")
+@files_argument("SCAN|STRESS...")
 @repeatable("--friction friction", _COEFFICIENT, metavar="MU")(
     "Friction coefficient to calculate profiles for, beside 0 and inf (the film sticks "
     "wherever it is touched); between them profiles are interpolated. Repeated: several.  "

@@ -22,6 +22,7 @@ from memscal.cli.options import (
     POSITION,
     Options,
     declared_options,
+    files_argument,
     film_from,
     film_options,
     indenter_from,
@@ -151,7 +152,7 @@ _NAMED = 12
 
 
 @click.command("import", epilog=EXAMPLES)
-@click.argument("tables", type=FILE, nargs=-1, required=True, metavar="TABLE|FOLDER...")
+@files_argument("TABLE|FOLDER...", "tables")
 @option("-o --output", FILE, required=True, metavar="OUT|FOLDER")(
     "Scan or reference to write; of several tables the folder, which has TABLE.h5 of each."
 )

@@ -46,9 +46,9 @@ FILE = _FileName(readable=False, path_type=Path)
 artifact_argument = click.argument("artifact", type=FILE)
 
 
-def scans_argument(metavar: str = "SCAN...") -> _Adder:
-    """Return the argument of one or several scans."""
-    return click.argument("scans", type=FILE, nargs=-1, required=True, metavar=metavar)
+def files_argument(metavar: str = "SCAN...", name: str = "scans") -> _Adder:
+    """Return the argument of one or several files."""
+    return click.argument(name, type=FILE, nargs=-1, required=True, metavar=metavar)
 
 
 #: Powers of ten that take what is given to SI units.

@@ -26,6 +26,8 @@ from memscal.summaries.table import Table
 #: Sources of the budget that count what is taken for granted, where they have other names.
 _COUNTED_AS = {"stage_scale": "position_scale", "film_law": "model_form", "load_scale": "load"}
 
+Fields = dict[str, str]
+"""What is filled into the texts, by name."""
 Item = str | Table | Picture
 Rows = list[Sequence[str]]
 
@@ -80,7 +82,7 @@ def parts_of(certificate: Certificate, fields: Mapping[str, str]) -> list[Part]:
     return parts
 
 
-def fields_of(certificate: Certificate) -> dict[str, str]:
+def fields_of(certificate: Certificate) -> Fields:
     """Return what is filled into the texts, by name; what is not known is not in it."""
     texts = certificate.texts
     fields = dict(texts["defaults"])
@@ -108,7 +110,7 @@ def fields_of(certificate: Certificate) -> dict[str, str]:
     return fields
 
 
-def _of_conditions(certificate: Certificate) -> dict[str, str]:
+def _of_conditions(certificate: Certificate) -> Fields:
     """Return number, dates, temperature, humidity and decision rule."""
     conditions = certificate.sections["conditions"]
     decision = certificate.sections["decision"]
@@ -135,7 +137,7 @@ def _of_conditions(certificate: Certificate) -> dict[str, str]:
     return fields
 
 
-def _of_calibration(certificate: Certificate) -> dict[str, str]:
+def _of_calibration(certificate: Certificate) -> Fields:
     """Return by what method, from which readings, and with which film and indenter."""
     apparatus = certificate.apparatus
     process = apparatus.process

@@ -16,7 +16,7 @@ import click
 from memscal.cli import output as out
 from memscal.cli.calibrate import calibration_options, calibration_settings
 from memscal.cli.failures import CHECK_FAILED, DONE, debug_option
-from memscal.cli.options import FILE, flag, json_option, option, report_option
+from memscal.cli.options import FILE, files_argument, flag, json_option, option, report_option
 from memscal.errors import MemscalError
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ Examples:
 
 
 @click.command("batch", epilog=EXAMPLES)
-@click.argument("sources", type=FILE, nargs=-1, required=True, metavar="FOLDER|MANIFEST|SCAN...")
+@files_argument("FOLDER|MANIFEST|SCAN...", "sources")
 @option("-o --output results", FILE, metavar="RESULTS", required=True)(
     "Folder of the results, which must not exist yet: tables (Parquet) in RESULTS/shards, "
     "artifacts in RESULTS/artifacts."

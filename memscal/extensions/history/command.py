@@ -8,7 +8,14 @@ import click
 
 from memscal.cli import output as out
 from memscal.cli.failures import CHECK_FAILED, DONE
-from memscal.cli.options import FILE, figure_option, option, output_options, repeatable
+from memscal.cli.options import (
+    FILE,
+    figure_option,
+    files_argument,
+    option,
+    output_options,
+    repeatable,
+)
 from memscal.formats.files import together
 
 EXAMPLES = """\b
@@ -28,7 +35,7 @@ def _tolerance(*given: str) -> float:
 
 
 @click.command("history", epilog=EXAMPLES)
-@click.argument("artifacts", type=FILE, nargs=-1, required=True, metavar="ARTIFACT...")
+@files_argument("ARTIFACT...", "artifacts")
 @option("-o --output", FILE, metavar="FILE.html")(
     "Page to write, without other files, network or scripts."
 )
