@@ -368,5 +368,4 @@ def read_table(path: Path, options: Options) -> ImportedScan:
     stated["load_cell"] = LoadCell(**stated_options(load_cell, _CELL_NAMES))
     stated["x_error"] = options["position_error"]
     columns = stated_options(options, ("x", "u", *ARRAYS))
-    scan = import_table(path, **columns, **records_of(stated))
-    return with_laboratory(options["lab"], scan)
+    return with_laboratory(options["lab"], import_table(path, **columns, **records_of(stated)))

@@ -301,8 +301,7 @@ def _completed(
             date.fromisoformat(text[:10])
             conditions[key] = text
     if sensor.temperature is not None:
-        stated = Measured(sensor.temperature, sensor.temperature_uncertainty)
-        conditions["temperature"] = stated
+        conditions["temperature"] = Measured(sensor.temperature, sensor.temperature_uncertainty)
     if held["user"].name:
         sections["person"]["operator"] = held["user"].name
     listed = []

@@ -132,8 +132,7 @@ def _of_conditions(certificate: Certificate) -> Fields:
             fields[f"{name}_expanded"] = repr(float(COVERAGE_FACTOR * (u or 0.0) / scale))
     if certificate.conformity:
         fields["guard_band"] = f"{decision.get('guard_band', 1.0):g}"
-        rule = certificate.words("decision", decision["rule"])
-        fields["decision"] = filled(rule, fields)
+        fields["decision"] = filled(certificate.words("decision", decision["rule"]), fields)
     return fields
 
 

@@ -122,8 +122,7 @@ def own_variance(columns: FloatArray, covariance: FloatArray) -> float:
     """Return the mean variance of a date beside the columns: what dates share is left out."""
     count, parameters = columns.shape
     rest = np.eye(count) - columns @ np.linalg.pinv(columns)
-    mean = np.trace(rest @ covariance) / max(count - parameters, 1)
-    return float(max(mean, TINY))
+    return float(max(np.trace(rest @ covariance) / max(count - parameters, 1), TINY))
 
 
 def change_tests(
