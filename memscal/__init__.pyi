@@ -1,5 +1,6 @@
 """Public names of memscal with their modules, which are loaded when a name is first used."""
 
+from . import acquire as acquire
 from .apparatus import ApparatusFunction as ApparatusFunction
 from .apparatus import load_apparatus as load_apparatus
 from .axisymmetry.grids import EvenGrid as EvenGrid

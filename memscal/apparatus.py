@@ -177,8 +177,7 @@ class ApparatusFunction(Result, ApparatusData):
         if y is not None:
             if isinstance(sigma_zz, IdealReference):
                 return self._of_ideal(self.convolve, r, y, sigma_zz)
-            stress = self._checked_field(r, y, sigma_zz)
-            return _convolved(r, y, stress, self.field)
+            return _convolved(r, y, self._checked_field(r, y, sigma_zz), self.field)
         radii, spectrum = self._checked(r, sigma_zz)
         profile = self.radial_profile
         kernel = hankel_transform(profile.r, profile.g, spectrum.wavenumbers.k)
@@ -215,7 +214,7 @@ class ApparatusFunction(Result, ApparatusData):
         """
         operator, _ = self._operator(r, sigma_zz)
         variance = np.einsum("ij,jk,ik->i", operator, self.radial_profile.g_covariance, operator)
-        return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
+        return floats(np.sqrt(np.maximum(variance, 0.0)))
 
     def predict_uncertainty(
         self, r: ArrayLike, sigma_zz: ArrayLike | IdealReference, *, y: ArrayLike | None = None
@@ -381,8 +380,9 @@ class ApparatusFunction(Result, ApparatusData):
                     cure="Interpolate it to even positions.",
                 )
             self._require_fine(step)
-        edge = max(float(np.abs(stress[[0, -1]]).max()), float(np.abs(stress[:, [0, -1]]).max()))
-        self._require_decayed(edge, float(np.abs(stress).max()), "the edge of the field")
+        sizes = np.abs(stress)
+        edge = max(sizes[[0, -1]].max(), sizes[:, [0, -1]].max())
+        self._require_decayed(edge, sizes.max(), "the edge of the field")
         return stress
 
     def _require_fine(self, step: float) -> None:
@@ -418,7 +418,7 @@ class ApparatusFunction(Result, ApparatusData):
         radii = finite_vector("r", r)
         if isinstance(sigma_zz, IdealReference):
             radii = np.abs(radii)
-            nodes = self._nodes(float(radii.max()))
+            nodes = self._nodes(radii.max())
             order = ACROSS if sigma_zz.shape == "slit" else 0
             return radii, RadialSpectrum(nodes, sigma_zz.transform(nodes.k), order)
         stress = finite_vector("sigma_zz", sigma_zz)
@@ -442,15 +442,14 @@ class ApparatusFunction(Result, ApparatusData):
         coarse = np.diff(radii)[strong].max(initial=0.0)
         self._require_fine(coarse)
         end = f"the end of the table, r = {radii[-1] * 1e3:.4g} mm"
-        self._require_decayed(float(abs(stress[-1])), peak, end)
-        nodes = self._nodes(float(radii[-1]))
+        self._require_decayed(abs(stress[-1]), peak, end)
+        nodes = self._nodes(radii[-1])
         values = hankel_transform(radii, stress, nodes.k, order=self.order)
         return radii, RadialSpectrum(nodes, values, self.order)
 
     def _nodes(self, reach: float) -> Wavenumbers:
         """Nodes for a stress out to ``reach`` (m): G is zero beyond the last one of its grid."""
-        last = float(self.transfer.k[-1])
-        return Wavenumbers.covering(last, reach + float(self.radial_profile.r[-1]))
+        return Wavenumbers.covering(self.transfer.k[-1], reach + self.radial_profile.r[-1])
 
 
 def _step(axis: ArrayLike) -> float:
@@ -510,13 +509,10 @@ def load_apparatus(path: str | PathLike[str], *, accept_altered: bool = False) -
     from memscal.formats.hdf5.writer import DIGEST_ATTRIBUTE
 
     with open_hdf5(path, accept_altered=accept_altered) as file:
-        data = artifact_from(file)
-        digest = file.attribute("/", DIGEST_ATTRIBUTE)
-        source = file.source
-    apparatus = ApparatusFunction(**vars(data))
-    object.__setattr__(apparatus, "source", source)
-    # Written again, it might have another digest by rounding: the file's is kept.
-    object.__setattr__(apparatus, "content_digest", str(digest))
+        apparatus = ApparatusFunction(**vars(artifact_from(file)))
+        # Written again, it might have another digest by rounding: the file's is kept.
+        digest = str(file.attribute("/", DIGEST_ATTRIBUTE))
+        vars(apparatus).update(source=file.source, content_digest=digest)
     return apparatus
 
 

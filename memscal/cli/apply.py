@@ -11,9 +11,9 @@ from memscal.cli.options import (
     artifact_argument,
     contact_options,
     figure_option,
+    files_argument,
     out_option,
     report_options,
-    scans_argument,
 )
 
 EXAMPLES = """\b
@@ -26,7 +26,7 @@ Examples:
 
 @click.command("apply", epilog=EXAMPLES)
 @artifact_argument
-@scans_argument()
+@files_argument()
 @out_option("File to write (memscal-stress). By default beside the first scan: SCAN.stress.h5.")
 @contact_options
 @figure_option("Draw the profiles of all loads, linear and logarithmic.")

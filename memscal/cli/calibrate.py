@@ -23,15 +23,17 @@ from memscal.cli.options import (
     accept_altered_option,
     brief_option,
     figure_option,
+    files_argument,
+    flag,
     force_option,
     json_option,
     noise_record_option,
     option,
     options_of,
     out_option,
+    repeatable,
     report_option,
     rod_friction_option,
-    scans_argument,
 )
 from memscal.extensions import hook
 from memscal.formats.files import together
@@ -153,7 +155,7 @@ calibration_options = options_of(
         "The same stress by another model of the film (memscal-reference): its difference is "
         "counted as an uncertainty of the model's form, in place of the linear film's."
     ),
-    option("--film-law", click.Choice(FILM_LAWS))(
+    option("--film-law", [*FILM_LAWS])(
         "Law of the film by which the rod is solved, taken as known. By default the one that scan "
         "or reference state; else neo-hookean, and its difference from linear is counted "
         "(model_form)."
@@ -163,10 +165,10 @@ calibration_options = options_of(
         "Whether the film slides freely under the rod (0) or sticks (inf), which matters at finite"
         " strain. By default as the scan states it; else midway, and the rest is counted."
     ),
-    option("--correlation correlations", multiple=True, metavar="INPUT,INPUT=R")(
+    repeatable("--correlation correlations", metavar="INPUT,INPUT=R")(
         "Correlation coefficient of two inputs' errors: thickness,poisson_ratio=0.5. Repeatable."
     ),
-    option("--channel", click.Choice(("zz", "xz", "yz")), "zz")(
+    option("--channel", ["zz", "xz", "yz"], "zz")(
         "Which voltage is calibrated. xz, yz: the shear, experimental, by method bayesian, to "
         "SCAN.xz.apparatus.h5."
     ),
@@ -177,11 +179,11 @@ calibration_options = options_of(
         "tikhonov, wiener, or a plug-in's. The other of bayesian and division is computed, too, "
         "and stands beside it.  [default: white-noise]"
     ),
-    option("--centre", click.Choice(("common", "per-repeat")))(
+    option("--centre", ["common", "per-repeat"])(
         "Whether the repeats of a scan share their centre, or each has a centre, baseline and "
         "drift of its own.  [default: per-repeat where a common centre has a p-value below 1/1000]"
     ),
-    option("--option options", multiple=True, metavar="NAME=VALUE")(
+    repeatable("--option options", metavar="NAME=VALUE")(
         "A parameter of the method, such as amplitude=0.5 (a factor on the noise amplitude that "
         "the rule chooses). May be repeated."
     ),
@@ -189,11 +191,11 @@ calibration_options = options_of(
     option("--creep", FILE)(
         "Creep of the sensor (memscal creep), by which a scan made in motion is corrected."
     ),
-    option("--override", is_flag=True)(
+    flag("--override")(
         "Go on although a reference is of another film, rod or load than its scan: recorded."
     ),
     accept_altered_option,
-    option("--relative", is_flag=True)(
+    flag("--relative")(
         "For scans at constant depth or of unknown load: no load counts, A is relative, and states"
         " no pascals."
     ),
@@ -211,7 +213,7 @@ def calibration_settings(
     options: tuple[str, ...],
     seed: int | None,
     **others: Any,
-) -> dict[str, Any]:
+) -> Options:
     """Return the options of :func:`memscal.calibrate` that options of the command line ask for."""
     accepted = others["accept_altered"]
     return {
@@ -225,20 +227,20 @@ def calibration_settings(
 
 
 @click.command("calibrate", epilog=EXAMPLES)
-@scans_argument()
+@files_argument()
 @out_option(
     "Artifact to write; by default SCAN.apparatus.h5 beside SCAN.h5, of an array SCAN.array.h5."
 )
 @calibration_options
-@option("--kernel", click.Choice(("common", "own", "auto", "measured")))(
+@option("--kernel", ["common", "own", "auto", "measured"])(
     "Array: one G of all sensors; a G of each; these where the evidence of a raster prefers them; "
     "or maps of what each sensor reads, without G and pascals.  [default: common]"
 )
-@option("--crosstalk", click.Choice(("auto", "none", "nearest", "full")))(
+@option("--crosstalk", ["auto", "none", "nearest", "full"])(
     "Array: pairs whose crosstalk is estimated: of neighbours, none, or all.  [default: auto, "
     "which is nearest]"
 )
-@option("--free", click.Choice(("thickness",)), multiple=True)(
+@repeatable("--free", ["thickness"])(
     "Estimate the film's thickness, too, from scans with several rods, or at several loads on a "
     "film of a stated law that is not linear; the stated thickness is its prior."
 )
@@ -246,7 +248,7 @@ def calibration_settings(
 @brief_option
 @report_option
 @figure_option("Draw scan, apparatus function and transfer function.")
-@option("--sweep sweeping", is_flag=True)(
+@flag("--sweep sweeping")(
     "Show how the results depend on the noise amplitude, over two decades and eight seeds."
 )
 @option("--sweep-figure", out.FigurePath(), metavar="FILE.png|svg|pdf")(
@@ -256,14 +258,12 @@ def calibration_settings(
     "Draw noise and all uncertain inputs this many times (1000 is usual), and compare what "
     "scatters with the budget of uncertainties. Each draw is calibrated like the scan."
 )
-@option("--compact", is_flag=True)(
+@flag("--compact")(
     "Leave G over the plane out of the artifact where it is round, which halves its size."
 )
 @noise_record_option
 @force_option
-@option("--dry-run", is_flag=True)(
-    "Read and check every input, print what would be done, and write nothing."
-)
+@flag("--dry-run")("Read and check every input, print what would be done, and write nothing.")
 @debug_option
 def command(
     scans: tuple[Path, ...],

@@ -18,9 +18,11 @@ from memscal.cli.options import (
     artifact_argument,
     contact_options,
     figure_option,
+    files_argument,
+    flag,
     option,
+    repeatable,
     report_options,
-    scans_argument,
 )
 from memscal.figures import FIGURE_SUFFIXES
 from memscal.formats.files import together
@@ -32,9 +34,9 @@ if TYPE_CHECKING:
 
 def figure_stems(lubrications: Iterable[str], *, interface: bool) -> list[str]:
     """Return the stems of all figures' names, without matplotlib; a test compares both."""
-    tails = [f"-{name}" if name else "" for name in dict.fromkeys(lubrications)]
     stems = []
-    for tail in tails:
+    for name in dict.fromkeys(lubrications):
+        tail = f"-{name}" if name else ""
         stems += [f"profiles{tail}", f"friction-set{tail}"]
     stems += ["maxima", "effective-friction", "likelihood"]
     return [*stems, "interface"] if interface else stems
@@ -78,21 +80,21 @@ Examples:
 
 @click.command("compare", epilog=EXAMPLES)
 @artifact_argument
-@scans_argument("SCAN|STRESS...")
-@option("--friction friction", _COEFFICIENT, multiple=True, metavar="MU")(
+@files_argument("SCAN|STRESS...")
+@repeatable("--friction friction", _COEFFICIENT, metavar="MU")(
     "Friction coefficient to calculate profiles for, beside 0 and inf (the film sticks "
     "wherever it is touched); between them profiles are interpolated. Repeated: several.  "
     "[default: nine between 0 and inf]"
 )
-@option("--loading loadings", click.Choice(["incremental", "total"]), multiple=True)(
+@repeatable("--loading loadings", ["incremental", "total"])(
     "A point sticks where it first touched (incremental), or as if loaded in one step "
     "(total). May be repeated.  [default: both]"
 )
-@option("--reference references", FILE, multiple=True)(
+@repeatable("--reference references", FILE)(
     "Profiles calculated elsewhere (memscal-reference), in place of memscal's: one file for "
     "each load and friction coefficient. Repeated."
 )
-@option("--lubricated", click.Choice(["frictionless", "apart"]))(
+@option("--lubricated", ["frictionless", "apart"])(
     "Fit lubricated loads with no friction (--lubricated-friction 0) together with the dry ones, "
     "or each kind by itself.  [default: together]"
 )
@@ -113,15 +115,15 @@ Examples:
 @option("--macroscopic-uncertainty", NonNegative("ratio"), metavar="U")(
     "Standard uncertainty (k = 1) of --macroscopic."
 )
-@option("--channel", click.Choice(["zz", "xz", "yz"]), "zz")(
+@option("--channel", ["zz", "xz", "yz"], "zz")(
     "xz or yz: compare the shear that a tangential channel measured, by its own ARTIFACT, with the "
     "points of one STRESS file (experimental)."
 )
-@option("--interface", is_flag=True)(
+@flag("--interface")(
     "Also explain the profiles by an interface that yields before it slips, at the "
     "macroscopic friction, and report which of the two explanations is more likely."
 )
-@option("--sliding", is_flag=True)(
+@flag("--sliding")(
     "Compare scans of a sphere that slid (/entry/indenter/motion) with contacts that slide."
 )
 @option("--backlash", NonNegative("um"))(
@@ -133,13 +135,13 @@ Examples:
     "Where calculated contacts are kept for the next run.  [default: memscal/contacts in "
     "the user's cache folder]"
 )
-@option("--no-cache", is_flag=True)("Calculate all contacts, and store none.")
+@flag("--no-cache")("Calculate all contacts, and store none.")
 @figure_option("Draw profiles, residuals, maxima and friction coefficients on one page.")
 @option("--figures folder", FILE, metavar="FOLDER")(
     "Draw each figure into a file of its own in this folder: profiles, profiles for a set of "
     "coefficients, maxima, effective friction, likelihood, interface."
 )
-@option("--figure-format", click.Choice(_FORMATS), "png")("Format of --figures.")
+@option("--figure-format", _FORMATS, "png")("Format of --figures.")
 @report_options
 def command(
     artifact: Path, scans: tuple[Path, ...], as_json: bool, force: bool, **options: Any
@@ -237,10 +239,10 @@ def _named_figures(options: Options, lubrications: Iterable[str]) -> dict[str, P
     return {stem: folder / f"{stem}.{options['figure_format']}" for stem in stems}
 
 
-def _drawn(comparison: FrictionComparison, named: Mapping[str, Path]) -> dict[Path, bytes]:
+def _drawn(comparison: FrictionComparison, named: Mapping[str, Path]) -> out.Files:
     from memscal.figures.friction import comparison_figures
 
-    files: dict[Path, bytes] = {}
+    files: out.Files = {}
     with out.working("Drawing"):
         for stem, draw in comparison_figures(comparison).items():
             files |= out.rendered(draw, [named[stem]])

@@ -22,6 +22,7 @@ from memscal.cli.options import (
     POSITION,
     Options,
     declared_options,
+    files_argument,
     film_from,
     film_options,
     indenter_from,
@@ -151,7 +152,7 @@ _NAMED = 12
 
 
 @click.command("import", epilog=EXAMPLES)
-@click.argument("tables", type=FILE, nargs=-1, required=True, metavar="TABLE|FOLDER...")
+@files_argument("TABLE|FOLDER...", "tables")
 @option("-o --output", FILE, required=True, metavar="OUT|FOLDER")(
     "Scan or reference to write; of several tables the folder, which has TABLE.h5 of each."
 )
@@ -209,8 +210,7 @@ def command(
         with out.working("Reading"):
             notes = convert(table, None if dry_run else output, kind, options, force=force)
         if save_recipe and not dry_run:
-            text = hook("recipe_text")(context)
-            out.write_files({save_recipe: text.encode()}, force=force)
+            out.write_files({save_recipe: hook("recipe_text")(context).encode()}, force=force)
         warnings = [note for note in notes if note.severity == "warning"]
         if as_json:
             out.emit_json(
@@ -329,7 +329,7 @@ def _example(table: Path, missing: Sequence[str], options: Options) -> str:
     )
 
 
-def stated_options(values: dict[str, Any], names: Iterable[str]) -> dict[str, Any]:
+def stated_options(values: Options, names: Iterable[str]) -> Options:
     """Return the options that were given, so that the library's own defaults hold."""
     return {name: values[name] for name in names if values[name] is not None}
 
@@ -342,8 +342,8 @@ _UNKNOWN = (
 )
 
 
-def _set_up(options: Options) -> dict[str, Any]:
-    stated: dict[str, Any] = {}
+def _set_up(options: Options) -> Options:
+    stated: Options = {}
     if stated_options(options, (*FILM_NUMBERS, *LAW, "film_name")):
         stated["film"] = film_from(options, _UNKNOWN)
     if stated_options(options, _INDENTER):
@@ -368,5 +368,4 @@ def read_table(path: Path, options: Options) -> ImportedScan:
     stated["load_cell"] = LoadCell(**stated_options(load_cell, _CELL_NAMES))
     stated["x_error"] = options["position_error"]
     columns = stated_options(options, ("x", "u", *ARRAYS))
-    scan = import_table(path, **columns, **records_of(stated))
-    return with_laboratory(options["lab"], scan)
+    return with_laboratory(options["lab"], import_table(path, **columns, **records_of(stated)))

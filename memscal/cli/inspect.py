@@ -78,7 +78,7 @@ def _arrays(arrays: Sequence[Item]) -> Table:
         head.append("missing")
     rows = []
     for item in arrays:
-        shape = " x ".join(str(n) for n in item["shape"]) or "one"
+        shape = " x ".join(map(str, item["shape"])) or "one"
         low = _number(item["minimum"])
         row = [item["path"], shape, low, _number(item["maximum"]), item["unit"]]
         if missing:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -21,10 +21,6 @@ if TYPE_CHECKING:
     from memscal.model.film import ElasticFilm
     from memscal.model.indenter import RoundIndenter
     from memscal.model.scan import Scan
-
-    _Number = click.ParamType[float]
-else:  # generic since click 8.2 only
-    _Number = click.ParamType
 
 _Command = Callable[..., Any]
 _Scan = TypeVar("_Scan", bound="Scan")
@@ -50,9 +46,9 @@ FILE = _FileName(readable=False, path_type=Path)
 artifact_argument = click.argument("artifact", type=FILE)
 
 
-def scans_argument(metavar: str = "SCAN...") -> _Adder:
-    """Return the argument of one or several scans."""
-    return click.argument("scans", type=FILE, nargs=-1, required=True, metavar=metavar)
+def files_argument(metavar: str = "SCAN...", name: str = "scans") -> _Adder:
+    """Return the argument of one or several files."""
+    return click.argument(name, type=FILE, nargs=-1, required=True, metavar=metavar)
 
 
 #: Powers of ten that take what is given to SI units.
@@ -77,23 +73,18 @@ def si(value: float, power: int) -> float:
     return float(Decimal(repr(value)).scaleb(power))
 
 
-class Quantity(_Number):
+@dataclass(eq=False)
+class Quantity(click.ParamType):  # type: ignore[type-arg] # generic since click 8.2 only
     """A finite number in a unit, the name of the value; it becomes one in SI units."""
 
-    def __init__(
-        self,
-        unit: str,
-        *,
-        low: float = 0.0,
-        high: float = math.inf,
-        open_low: bool = True,
-        infinite: bool = False,
-    ) -> None:
-        self.name = unit
-        self.low = low
-        self.high = high
-        self.open_low = open_low
-        self.infinite = infinite
+    unit: str
+    low: float = 0.0
+    high: float = math.inf
+    open_low: bool = True
+    infinite: bool = False
+
+    def __post_init__(self) -> None:
+        self.name = self.unit
 
     def convert(
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
@@ -131,14 +122,22 @@ NonNegative = partial(Quantity, open_low=False)
 
 
 def option(
-    names: str, kind: Any = None, default: Any = None, *, show_default: bool = True, **settings: Any
+    names: str, kind: Any = None, default: Any = None, **settings: Any
 ) -> Callable[[str], _Adder]:
     """Return what makes an option of its help text; blanks part its names."""
-    # A kind that is a text is the name of the value, which is then any text.
+    # A kind that is a text is the name of the value, which is then any text; a list is of choices.
+    if isinstance(kind, list):
+        kind = click.Choice(kind)
     settings |= {"metavar": kind} if isinstance(kind, str) else {"type": kind}
     if default is not None:
-        settings |= {"default": default, "show_default": show_default}
+        settings = {"default": default, "show_default": True} | settings
     return lambda about: click.option(*names.split(), help=about, **settings)
+
+
+flag = partial(option, is_flag=True)
+"""An option without a value."""
+repeatable = partial(option, multiple=True)
+"""An option that may be given several times."""
 
 
 def options_of(*options: _Adder) -> _Adder:
@@ -170,7 +169,7 @@ def _declared(
     if number:
         value = Quantity(**number)
     elif choices:
-        value = click.Choice(choices)
+        value = choices
     return option(names, value, **settings)(about)
 
 
@@ -180,7 +179,7 @@ out_option = option("-o --output", FILE, metavar="OUT")
 
 def figure_option(about: str) -> _Adder:
     """Return the option of a figure's files; the text says what is drawn."""
-    return option("--figure figures", FigurePath(), multiple=True, metavar="FILE.png|svg|pdf")(
+    return repeatable("--figure figures", FigurePath(), metavar="FILE.png|svg|pdf")(
         f"{about} May be repeated."
     )
 
@@ -206,20 +205,20 @@ def _one_form(ctx: click.Context, param: click.Parameter, given: bool) -> bool:
     return given
 
 
-json_option = option("--json as_json", is_flag=True, callback=_one_form)(
+json_option = flag("--json as_json", callback=_one_form)(
     "Print one JSON object in place of tables."
 )
-brief_option = option("--brief", is_flag=True, callback=_one_form)(
+brief_option = flag("--brief", callback=_one_form)(
     "Print the first lines only, which say what was found."
 )
-force_option = option("--force", is_flag=True)("Replace outputs that exist.")
+force_option = flag("--force")("Replace outputs that exist.")
 report_option = option("--report", FILE, metavar="FILE.html")(
     "Write a report as one HTML page, without other files, network or scripts."
 )
-override_option = option("--override", is_flag=True)(
+override_option = flag("--override")(
     "Go on although sensor, channel or film of artifact and scan differ: recorded in the output."
 )
-accept_altered_option = option("--accept-altered", is_flag=True)(
+accept_altered_option = flag("--accept-altered")(
     "Use files although their content does not fit their digest: recorded in the output."
 )
 noise_record_option = option("--noise-record", FILE)(
@@ -281,7 +280,7 @@ def film_options(*, defaults: Defaults = _NO_DEFAULTS, uncertainties: bool = Tru
     )
     return options_of(
         _measured(entries, defaults, uncertainties),
-        option("--film-law", click.Choice(FILM_LAWS), defaults.get("film-law"))(
+        option("--film-law", [*FILM_LAWS], defaults.get("film-law"))(
             "Law of the film's stress: small strain, or rubber."
         ),
         option("--mooney-rivlin-ratio", NonNegative("ratio"))(
@@ -292,7 +291,7 @@ def film_options(*, defaults: Defaults = _NO_DEFAULTS, uncertainties: bool = Tru
 
 rod_friction_option = option(
     "--rod-friction",
-    click.Choice(["0", "inf"]),
+    ["0", "inf"],
     callback=lambda _, __, text: None if text is None else float(text),
 )
 FREE_OR_STUCK = "Rod: 0, the film slides freely under it; inf, it sticks."
@@ -318,8 +317,7 @@ def _measured(
     """Return the options of quantities, then those of their uncertainties (the last texts)."""
     options = [(name, kind, about) for name, kind, about, _ in entries]
     for name, kind, _, of in entries if uncertainties else ():
-        spread = NonNegative(kind.name)
-        options.append((f"{name}-uncertainty", spread, _UNCERTAINTY + of))
+        options.append((f"{name}-uncertainty", NonNegative(kind.name), _UNCERTAINTY + of))
     return options_of(
         *(option(f"--{name}", kind, defaults.get(name))(about) for name, kind, about in options)
     )
@@ -364,11 +362,11 @@ def _require(subject: str, options: Options, names: Iterable[str], otherwise: st
 
 
 kernel_options = options_of(
-    option("--sigma sigmas", Quantity("um"), (561.0,), multiple=True)(
+    repeatable("--sigma sigmas", Quantity("um"), (561.0,))(
         "Standard deviation of the Gaussian apparatus function, in um. Repeated with "
         "--weight: a sum of Gaussians."
     ),
-    option("--weight weights", Quantity("ratio", low=-math.inf), multiple=True)(
+    repeatable("--weight weights", Quantity("ratio", low=-math.inf))(
         "Share of each Gaussian, in the order of --sigma; they add up to 1."
     ),
     option("--disc-radius", Quantity("um"))(

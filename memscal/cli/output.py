@@ -274,7 +274,11 @@ def prove_writable(
         ensure_writable(output, overwrite=force, inputs=read)
 
 
-def rendered(draw: Callable[[], Figure], paths: Sequence[Path]) -> dict[Path, bytes]:
+Files = dict[Path, bytes]
+"""Contents of files, by their names."""
+
+
+def rendered(draw: Callable[[], Figure], paths: Sequence[Path]) -> Files:
     """Return a figure as the bytes of files; without files it is not drawn."""
     if not paths:
         return {}
@@ -284,14 +288,12 @@ def rendered(draw: Callable[[], Figure], paths: Sequence[Path]) -> dict[Path, by
     return {path: render_figure(figure, figure_format(path.suffix)) for path in paths}
 
 
-def reported(result: Told, path: Path | None) -> dict[Path, bytes]:
+def reported(result: Told, path: Path | None) -> Files:
     """Return a result's page as the bytes of its file, if one is asked for."""
-    return {} if path is None else {path: result.report().encode("utf-8")}
+    return {} if path is None else {path: result.report().encode()}
 
 
-def drawn(
-    result: Shown, figures: Sequence[Path] = (), report: Path | None = None
-) -> dict[Path, bytes]:
+def drawn(result: Shown, figures: Sequence[Path] = (), report: Path | None = None) -> Files:
     """Return figure and page of a result as the bytes of their files."""
     with working("Drawing"):
         return rendered(result.plot, figures) | reported(result, report)

@@ -25,6 +25,7 @@ from memscal.cli.options import (
     out_option,
     output_options,
     radius_options,
+    repeatable,
 )
 from memscal.extensions import hook
 from memscal.formats.files import together
@@ -118,11 +119,11 @@ Examples:
 
 @click.command("reference", epilog=EXAMPLES)
 @click.argument("indenter", type=click.Choice(SHAPES))
-@option("--load loads", Quantity("N"), multiple=True)(
+@repeatable("--load loads", Quantity("N"))(
     "Normal load, in N. Repeated, a path: visited in the order given.  [default: 1, without "
     "--depth]"
 )
-@option("--depth depths", Quantity("um"), multiple=True)(
+@repeatable("--depth depths", Quantity("um"))(
     "Indentation depth, in um, in place of a load. May be repeated."
 )
 @radius_options("the rod or of the sphere's curvature", uncertainties=False)
@@ -138,15 +139,15 @@ Examples:
     "Friction coefficient between indenter and film; inf: it sticks wherever it touches.  "
     "[default: 0; inf of a rod on a film that is not linear]"
 )
-@option("--loading", click.Choice(["incremental", "total"]), "incremental")(
+@option("--loading", ["incremental", "total"], "incremental")(
     "A point sticks where it first touched, or as if loaded in one step. The same under a rod."
 )
 @interface_options
 @film_options(defaults={**PAPER, "film-law": None}, uncertainties=False)
-@option("--backend", click.Choice(["hankel", "fem"]), "hankel")(
+@option("--backend", ["hankel", "fem"], "hankel")(
     "Hankel transforms on an infinite film, or finite elements on one with a free edge."
 )
-@option("--strain", click.Choice(["linear", "finite"]))(
+@option("--strain", ["linear", "finite"])(
     "finite: --film-law neo-hookean, unless another is given; linear: --film-law linear."
 )
 @option("--film-radius", Quantity("mm"))(
@@ -239,8 +240,8 @@ def _pressed(indenter: str, options: Options) -> list[Contact]:
     if friction is None:
         # A film that slides is drawn out from under a rod, and is not solved to any depth.
         friction = math.inf if indenter == "rod" and not linear else 0.0
-    depths = list(options["depths"])
-    loads = None if depths else list(options["loads"] or (1.0,))
+    depths = options["depths"]
+    loads = None if depths else options["loads"] or (1.0,)
     with out.working("Pressing"):
         return indent(
             film,

@@ -42,7 +42,7 @@ Examples:
     "friction, to be shown beside the result."
 )
 @option("--load", Quantity("N"))("Which load of a scan of several is restored, in N.")
-@option("--direction", click.Choice(["forth", "back"]))(
+@option("--direction", ["forth", "back"])(
     "Which direction is restored of a scan whose indenter slid forth and back."
 )
 @contact_options

@@ -1,10 +1,9 @@
-"""The table of what is loaded when it is asked for: commands, views, hooks, and public names.
+"""The table of what is loaded when it is asked for: commands, views and hooks.
 
 Names stand as text, so that reading the table loads no extension.  The core calls what stands above
 it by a hook, and never imports it; an extension is one folder here, and its lines in this table.
 """
 
-from collections.abc import Callable
 from importlib import import_module
 from typing import Any
 
@@ -154,25 +153,6 @@ FILES = {
 }
 """Schema of an extension's files: the module with their reader, ``read_open``, and ``LAYOUT``."""
 
-PUBLIC = {
-    "extensions.arrays.calibrate_array": ["ArrayCalibration", "calibrate_array"],
-    "extensions.arrays.contacts": ["Contacts"],
-    "extensions.arrays.sensor_array": ["SensorArray", "load_array"],
-    "extensions.fleet.many": ["FleetCalibration", "calibrate_many"],
-    "extensions.history.history": ["History", "history"],
-    "extensions.interface_laws.results": ["InterfaceComparison"],
-    "extensions.monte_carlo.monte_carlo": ["MonteCarlo", "monte_carlo"],
-    "extensions.monte_carlo.sweep": ["Sweep"],
-    "extensions.motion.slide": ["slide"],
-    "extensions.motion.sliding_contact": ["SlidingContact"],
-    "extensions.planning.design": ["Design", "Plan", "design"],
-    "extensions.response.response": ["Response", "response"],
-    "extensions.simulation.disturbances": ["Disturbances"],
-    "extensions.simulation.experiment": ["Experiment", "simulate_experiment"],
-    "extensions.simulation.rod_scan": ["simulate"],
-}
-"""Module of an extension: its names that are public as ``memscal.NAME``."""
-
 USES = {"planning": ["simulation"], "acquisition": ["planning"]}
 """Extension: the other ones that it imports."""
 
@@ -182,7 +162,6 @@ def module(name: str) -> Any:
     return import_module(f"memscal.{name}")
 
 
-def hook(name: str) -> Callable[..., Any]:
+def hook(name: str) -> Any:
     """Import a function that the table names."""
-    function: Callable[..., Any] = getattr(module(HOOKS[name]), name)
-    return function
+    return getattr(module(HOOKS[name]), name)

@@ -18,6 +18,9 @@ from memscal.model.scan import Scan
 
 _LOG = logging.getLogger("memscal")
 
+Document = Mapping[str, Any]
+"""A document of a run of Bluesky."""
+
 
 class LiveScan:
     """A scan of what is read so far, calibrated as it grows; it never stops what records it.
@@ -96,7 +99,7 @@ class LiveScan:
         self._found = set[str]()
         self._run: str | None = None
 
-    def __call__(self, name: str, document: Mapping[str, Any]) -> None:
+    def __call__(self, name: str, document: Document) -> None:
         """Take a document of a run: start, descriptor, event, event_page or stop."""
         try:
             self._take(name, document)
@@ -132,8 +135,7 @@ class LiveScan:
         x, u, load, time = np.array(self._rows).T
         known: Values = {"load_column": load, "time": time - time[0]}
         known = {name: values for name, values in known.items() if np.isfinite(values).any()}
-        made = Scan.from_arrays(x, u, **self.units, **known)
-        return replace(made, **self.stated)
+        return replace(Scan.from_arrays(x, u, **self.units, **known), **self.stated)
 
     def calibrate(self) -> Calibration:
         """Calibrate what was read so far, and keep it as ``result``; errors are raised."""
@@ -179,7 +181,7 @@ class LiveScan:
                 return False
         return True
 
-    def _take(self, name: str, document: Mapping[str, Any]) -> None:
+    def _take(self, name: str, document: Document) -> None:
         if name == "descriptor":
             self._describe(document)
         elif name in ("event", "event_page") and document["descriptor"] in self._streams:
@@ -189,7 +191,7 @@ class LiveScan:
         elif name == "stop" and self._run in (None, document.get("run_start", self._run)):
             self._try()
 
-    def _describe(self, document: Mapping[str, Any]) -> None:
+    def _describe(self, document: Document) -> None:
         """Count the stream of a descriptor if it has both keys; forget the run before."""
         keys = document["data_keys"].keys()
         self._found.update(keys)
@@ -202,7 +204,7 @@ class LiveScan:
             self._run = run
             self._streams.add(document["uid"])
 
-    def _readings(self, name: str, document: Mapping[str, Any]) -> Iterable[Any]:
+    def _readings(self, name: str, document: Document) -> Iterable[Any]:
         """Return position, reading and time of each event; None where it has none."""
         x, u = self.keys
         values = [document["data"].get(key) for key in (x, u)]

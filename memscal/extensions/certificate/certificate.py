@@ -200,11 +200,10 @@ def certify(
     apparatus.require_pascals()
     sections, equipment = _completed(apparatus, laboratory)
     language = sections["certificate"].get("language", "en")
-    texts = tomllib.loads((TEXTS / f"{language}.toml").read_text(encoding="utf-8"))
+    texts = tomllib.loads((TEXTS / f"{language}.toml").read_text("utf-8"))
     values = {}
-    parameters = apparatus.parameters
     for name in (*_SENSOR_PARAMETERS, _OTHER):
-        if name in parameters:
+        if name in apparatus.parameters:
             values[name] = _certified(apparatus, name)
     missing = []
     for key in missing_keys(sections, equipment):
@@ -302,8 +301,7 @@ def _completed(
             date.fromisoformat(text[:10])
             conditions[key] = text
     if sensor.temperature is not None:
-        stated = Measured(sensor.temperature, sensor.temperature_uncertainty)
-        conditions["temperature"] = stated
+        conditions["temperature"] = Measured(sensor.temperature, sensor.temperature_uncertainty)
     if held["user"].name:
         sections["person"]["operator"] = held["user"].name
     listed = []

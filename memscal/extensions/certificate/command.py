@@ -6,7 +6,7 @@ import click
 
 from memscal.cli import output as out
 from memscal.cli.failures import exit_code_of
-from memscal.cli.options import FILE, artifact_argument, option, output_options
+from memscal.cli.options import FILE, artifact_argument, flag, option, output_options, repeatable
 from memscal.summaries.table import Table
 
 EXAMPLES = """\b
@@ -27,13 +27,11 @@ _FORM = out.FigurePath((".html", ".pdf", ".xml"))
 @option("--lab laboratory", FILE, required=True, metavar="lab.toml")(
     "Laboratory's file: laboratory, customer, sensor, equipment, conditions, decision rule."
 )
-@option("-o --output outputs", _FORM, multiple=True, required=True, metavar="FILE.html|pdf|xml")(
+@repeatable("-o --output outputs", _FORM, required=True, metavar="FILE.html|pdf|xml")(
     "Certificate to write: a page, a tagged PDF/A-3 that holds the XML, or a Digital Calibration "
     "Certificate (DCC). May be repeated."
 )
-@option("--incomplete", is_flag=True)(
-    "Write a certificate that says what it lacks, and states no conformity."
-)
+@flag("--incomplete")("Write a certificate that says what it lacks, and states no conformity.")
 @output_options
 def command(
     artifact: Path,
@@ -65,7 +63,7 @@ def command(
         with out.working("Drawing"):
             page = page_of(certificate)
             if ".html" in forms:
-                made[".html"] = certificate_page(page).encode("utf-8")
+                made[".html"] = certificate_page(page).encode()
             if ".pdf" in forms:
                 made[".pdf"] = certificate_pdf(page, made[".xml"])
     out.write_files({path: made[path.suffix.lower()] for path in outputs}, force=force)

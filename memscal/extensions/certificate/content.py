@@ -1,6 +1,6 @@
 """What stands in a certificate, in the words of its language: texts, tables and figures."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from functools import partial
 from string import Template
@@ -26,10 +26,10 @@ from memscal.summaries.table import Table
 #: Sources of the budget that count what is taken for granted, where they have other names.
 _COUNTED_AS = {"stage_scale": "position_scale", "film_law": "model_form", "load_scale": "load"}
 
+Fields = dict[str, str]
+"""What is filled into the texts, by name."""
 Item = str | Table | Picture
 Rows = list[Sequence[str]]
-Made = tuple[Sequence[str], Rows]
-"""Heads beyond those of the texts, and rows of a table."""
 
 
 class Part(NamedTuple):
@@ -55,10 +55,14 @@ def parts_of(certificate: Certificate, fields: Mapping[str, str]) -> list[Part]:
     for name, form in texts["forms"].items():
         lines = [(label, filled(text, fields)) for label, text in form.items()]
         known[name] = Table("", ("", ""), [line for line in lines if line[1]])
+    numbers = [f"({i})" for i in range(1, len(certificate.values) + 1)]
+    units = zip(numbers, certificate.values, strict=True)
+    # Beyond those of the texts.
+    heads = {"values": numbers, "budget": [f"{number} {_unit(value)}" for number, value in units]}
     for name, make in _TABLES.items():
-        heads, rows = make(certificate)
         stated = texts["tables"][name]
-        known[name] = Table(filled(stated["title"], fields), [*stated["head"], *heads], rows)
+        head = [*stated["head"], *heads.get(name, ())]
+        known[name] = Table(filled(stated["title"], fields), head, make(certificate))
     for name, draw in _FIGURES.items():
         stated = texts["figures"][name]
         known[name] = Picture(
@@ -78,17 +82,17 @@ def parts_of(certificate: Certificate, fields: Mapping[str, str]) -> list[Part]:
     return parts
 
 
-def fields_of(certificate: Certificate) -> dict[str, str]:
+def fields_of(certificate: Certificate) -> Fields:
     """Return what is filled into the texts, by name; what is not known is not in it."""
     texts = certificate.texts
-    fields: dict[str, str] = dict(texts["defaults"])
+    fields = dict(texts["defaults"])
     for section, stated in certificate.sections.items():
         for key, value in stated.items():
             if isinstance(value, str) and value:
                 fields[f"{section}_{key}"] = value
     fields |= _of_conditions(certificate) | _of_calibration(certificate)
     shown = {item.get("kind") for item in certificate.equipment}
-    lists: dict[str, list[str]] = {
+    lists = {
         "traceable": [],
         "untraceable": [],
         "missing": [item.words for item in certificate.missing],
@@ -106,7 +110,7 @@ def fields_of(certificate: Certificate) -> dict[str, str]:
     return fields
 
 
-def _of_conditions(certificate: Certificate) -> dict[str, str]:
+def _of_conditions(certificate: Certificate) -> Fields:
     """Return number, dates, temperature, humidity and decision rule."""
     conditions = certificate.sections["conditions"]
     decision = certificate.sections["decision"]
@@ -128,12 +132,11 @@ def _of_conditions(certificate: Certificate) -> dict[str, str]:
             fields[f"{name}_expanded"] = repr(float(COVERAGE_FACTOR * (u or 0.0) / scale))
     if certificate.conformity:
         fields["guard_band"] = f"{decision.get('guard_band', 1.0):g}"
-        rule = certificate.words("decision", decision["rule"])
-        fields["decision"] = filled(rule, fields)
+        fields["decision"] = filled(certificate.words("decision", decision["rule"]), fields)
     return fields
 
 
-def _of_calibration(certificate: Certificate) -> dict[str, str]:
+def _of_calibration(certificate: Certificate) -> Fields:
     """Return by what method, from which readings, and with which film and indenter."""
     apparatus = certificate.apparatus
     process = apparatus.process
@@ -205,7 +208,7 @@ def _share(value: CertifiedValue) -> str:
     return f"{share:g} %"
 
 
-def _values(certificate: Certificate) -> Made:
+def _values(certificate: Certificate) -> Rows:
     rows: Rows = []
     count = len(certificate.values)
     for i, value in enumerate(certificate.values):
@@ -213,34 +216,30 @@ def _values(certificate: Certificate) -> Made:
         row += [f"{value.factor:.3g}", _share(value)]
         row += [f"{round(r, 2) + 0:.2f}" for r in certificate.correlation[i, :i]]
         rows.append([*row, "1", *[""] * (count - i - 1)])
-    return [f"({i + 1})" for i in range(count)], rows
+    return rows
 
 
-def _others(certificate: Certificate) -> Made:
-    rows: Rows = [
-        (_name(certificate, v), _measured(v), f"{v.factor:.3g}") for v in certificate.others
-    ]
-    return (), rows
+def _others(certificate: Certificate) -> Rows:
+    return [(_name(certificate, v), _measured(v), f"{v.factor:.3g}") for v in certificate.others]
 
 
-def _profile(certificate: Certificate) -> Made:
+def _profile(certificate: Certificate) -> Rows:
     r, g, covariance = certificate.profile
     expanded = COVERAGE_FACTOR * np.sqrt(np.diag(covariance))
-    rows: Rows = [
+    return [
         [f"{radius:.4g}", format_measured(value, u)]
         for radius, value, u in zip(r / MM, g / PER_MM2, expanded / PER_MM2, strict=True)
     ]
-    return (), rows
 
 
-def _equipment(certificate: Certificate) -> Made:
+def _equipment(certificate: Certificate) -> Rows:
     rows: Rows = []
     for item in certificate.equipment:
         kind = certificate.words("kinds", item.get("kind", ""))
         rows.append(
             [kind, *(item.get(key) or "" for key in ("name", "serial", "certificate", "date"))]
         )
-    return (), rows
+    return rows
 
 
 def assumption_rows(certificate: Certificate) -> Rows:
@@ -259,10 +258,9 @@ def assumption_rows(certificate: Certificate) -> Rows:
     return rows
 
 
-def _budget(certificate: Certificate) -> Made:
+def _budget(certificate: Certificate) -> Rows:
     """Return contributions to u of each value, in the unit of its last digits."""
-    heads = [f"({i}) {_unit(value)}" for i, value in enumerate(certificate.values, start=1)]
-    return heads, _contributions(certificate)[0]
+    return _contributions(certificate)[0]
 
 
 def _unit(value: CertifiedValue) -> str:
@@ -285,7 +283,7 @@ def _contributions(certificate: Certificate) -> tuple[Rows, list[str]]:
         totals.append(f"{total_of(budget) / unit:.{places}f}" if budget else "")
         for source, u in budget.items():
             sizes[source] = max(sizes.get(source, 0.0), abs(u) / value.uncertainty)
-    rows: Rows = []
+    rows = []
     negligible = []
     for source in sorted(sizes, key=lambda source: -sizes[source]):
         words = certificate.words("sources", source)
@@ -304,7 +302,7 @@ def _digits(value: CertifiedValue) -> tuple[int, int]:
     return len(spread.partition(".")[2]), power
 
 
-def _conformity(certificate: Certificate) -> Made:
+def _conformity(certificate: Certificate) -> Rows:
     rows: Rows = []
     for item in certificate.conformity:
         value = item.certified
@@ -318,7 +316,7 @@ def _conformity(certificate: Certificate) -> Made:
         row = [f"{_name(certificate, value)} ({_unit(value) or '1'})", y]
         row += [f"{lower} – {upper}", f"{lowest} – {highest}", _percent(item.probability)]
         rows.append([*row, certificate.words("statements", item.statement)])
-    return (), rows
+    return rows
 
 
 def _percent(probability: float) -> str:
@@ -340,9 +338,9 @@ def scan_figure(apparatus: ApparatusFunction) -> Figure:
     return figure
 
 
-_TABLES: Mapping[str, Callable[[Certificate], Made]] = {
+_TABLES = {
     "equipment": _equipment,
-    "assumptions": lambda certificate: ((), assumption_rows(certificate)),
+    "assumptions": assumption_rows,
     "values": _values,
     "profile": _profile,
     "budget": _budget,

@@ -8,6 +8,7 @@ from typing import Any
 from xml.etree import ElementTree as ET
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.special import chdtri
 
 from memscal.extensions.certificate.certificate import (
@@ -18,7 +19,7 @@ from memscal.extensions.certificate.certificate import (
 )
 from memscal.extensions.certificate.content import assumption_rows, fields_of, filled
 from memscal.formats.units import dsi_unit
-from memscal.model.arrays import FloatArray, Values
+from memscal.model.arrays import FloatArray, Values, floats
 from memscal.model.quantities import DIMENSIONS, PER_MM
 from memscal.version import __version__
 
@@ -54,10 +55,9 @@ def certificate_xml(certificate: Certificate) -> bytes:
         (place,) = root.iterfind(f".//dcc:{name}", _SPACES)
         _grow(place, tree)
     _prune(root)
-    texts = certificate.texts["xml"]
     for content in root.iterfind(".//dcc:content", _SPACES):
         content.set("lang", fields["certificate_language"])
-        content.text = texts.get(content.text, content.text)
+        content.text = certificate.texts["xml"].get(content.text, content.text)
     ET.indent(root)
     return bytes(ET.tostring(root, encoding="utf-8", xml_declaration=True))
 
@@ -119,8 +119,8 @@ def _real(value: float, unit: str) -> Tree:
     return {"si:value": _numbers(value), "si:unit": dsi_unit(unit)}
 
 
-def _numbers(values: float | Iterable[float] | FloatArray) -> str:
-    numbers = np.atleast_1d(np.asarray(values, dtype=np.float64)).tolist()
+def _numbers(values: ArrayLike) -> str:
+    numbers = floats(values).ravel().tolist()
     return " ".join(repr(number) if np.isfinite(number) else "NaN" for number in numbers)
 
 
@@ -145,10 +145,9 @@ def _listed(
             "si:coverageFactorXMLList": _numbers(np.broadcast_to(factors, u.shape)),
             "si:coverageProbabilityXMLList": _numbers(np.full_like(u, COVERAGE_PROBABILITY)),
         }
-        region = _region(covariance, units)
         stated["si:measurementUncertaintyUnivariateXMLList"] = {"si:expandedMUXMLList": expanded}
         stated["si:measurementUncertaintyMultivariateXMLList"] = {
-            "si:ellipsoidalRegionMUXMLList": region
+            "si:ellipsoidalRegionMUXMLList": _region(covariance, units)
         }
     return {"name": _words(name), "si:realListXMLList": stated}
 
@@ -199,8 +198,10 @@ def _profile(certificate: Certificate) -> Tree:
     profile = certificate.profile
     radii = _listed("radius", profile.r / r.scale, [r.shown])
     values = _listed("profile", profile.g / g.scale, [g.shown], profile.covariance / g.scale**2)
-    data = {"list": {"quantity": [radii, values]}}
-    return {"name": _words("apparatus_function"), "data": data}
+    return {
+        "name": _words("apparatus_function"),
+        "data": {"list": {"quantity": [radii, values]}},
+    }
 
 
 def _artifact(certificate: Certificate) -> Tree:
@@ -229,8 +230,7 @@ def _conformity(certificate: Certificate, fields: Mapping[str, str]) -> list[Tre
             if np.isfinite(number):
                 real = _real(number / quantity.scale, quantity.unit)
                 shown.append({"name": _words(name), "si:real": real})
-        probability = _real(item.probability, "1")
-        shown.append({"name": _words("probability"), "si:real": probability})
+        shown.append({"name": _words("probability"), "si:real": _real(item.probability, "1")})
         statements.append(
             {
                 "name": _words(certificate.words("quantities", quantity.name)),

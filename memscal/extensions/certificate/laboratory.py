@@ -65,8 +65,8 @@ _KEYS = {
     "quantity": "value:number unit uncertainty:number",
 }
 SECTIONS = {
-    section: {key.partition(":")[0].strip("*"): key.partition(":")[2] or "text" for key in keys}
-    for section, keys in ((section, text.split()) for section, text in _KEYS.items())
+    section: {key: kind or "text" for key, kind in re.findall(r"(\w+)\*?:?(\w*)", text)}
+    for section, text in _KEYS.items()
 }
 """Every key of the file with its kind, by its section, of limits, and of quantities."""
 NEEDED = {section: re.findall(r"(\w+)\*", text) for section, text in _KEYS.items() if "*" in text}
@@ -162,7 +162,7 @@ def read_laboratory(path: FilePath) -> LaboratoryFile:
     """Read a laboratory's file; a key that is not known is refused, with the nearest that is."""
     name = Path(path).name
     try:
-        content = tomllib.loads(read_bytes(path, limit=_LONGEST).decode("utf-8"))
+        content = tomllib.loads(read_bytes(path, limit=_LONGEST).decode())
     except (UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
         raise FormatError(
             f"{name} is no TOML: {error}.",

@@ -49,7 +49,7 @@ def certificate_page(page: Page) -> str:
         items = "\n".join(_html(name, item) for name, item in part.items)
         sections.append(f"<section>\n<h2>{escape(part.heading)}</h2>\n{items}\n</section>")
     texts["parts"] = "\n".join(sections)
-    return Template(_HTML.read_text(encoding="utf-8")).substitute(texts, created=timestamp())
+    return Template(_HTML.read_text("utf-8")).substitute(texts, created=timestamp())
 
 
 def _css(character: str) -> str:
@@ -81,16 +81,15 @@ def certificate_pdf(page: Page, xml: bytes) -> bytes:
         items = [_plain(name, item) for name, item in part.items]
         parts.append({"heading": part.heading, "items": items})
     contents = {"texts": page.texts, "boxes": page.boxes, "parts": parts}
-    made: bytes = typst.compile(
+    return typst.compile(
         _TYPST,
         format="pdf",
         pdf_standards=["a-3a", "ua-1"],
-        sys_inputs={"contents": json.dumps(contents), "xml": xml.decode("utf-8")},
+        sys_inputs={"contents": json.dumps(contents), "xml": xml.decode()},
         font_paths=[Path(mpl.get_data_path(), "fonts", "ttf")],
         ignore_system_fonts=True,
         timestamp=int(datetime.fromisoformat(timestamp()).timestamp()),
     )
-    return made
 
 
 def _plain(name: str, item: Item) -> Values:
@@ -98,6 +97,6 @@ def _plain(name: str, item: Item) -> Values:
     if isinstance(item, Table):
         return {"name": name, "title": item.title, "head": [*item.head], "rows": [*item.rows]}
     if isinstance(item, Picture):
-        drawn = render_figure(item.draw(), "svg", dpi=72).decode("utf-8")
+        drawn = render_figure(item.draw(), "svg", dpi=72).decode()
         return {"svg": drawn, "alt": item.alt, "caption": item.caption}
     return {"text": item}

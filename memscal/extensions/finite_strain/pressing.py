@@ -180,10 +180,9 @@ class Pressing:
     def placed(self, state: Pressed) -> Pressed:
         """Return the state with its touching nodes on the face."""
         x = state.x.copy()
-        n = self.elements.n
         points, _, _ = self.face.contour(state.place)
         x[state.touching] = points[0] - self.elements.nodes[0][state.touching]
-        x[state.touching + n] = points[1] - state.depth
+        x[state.touching + self.elements.n] = points[1] - state.depth
         x[self.elements.held] = 0.0
         return replace(state, x=x)
 
@@ -283,11 +282,10 @@ class Pressing:
         touching = state.touching
         n = self.elements.n
         stiffness = self.elements.tangent(state.x)
-        free = self._free(state)
         _, _, bends = self.face.contour(state.place)
         curvature = np.zeros(forces.size)
         curvature[touching] = forces[touching] * bends[0] + forces[touching + n] * bends[1]
-        reduced = change.T @ stiffness @ change + sparse.diags_array(curvature[free])
+        reduced = change.T @ stiffness @ change + sparse.diags_array(curvature[self._free(state)])
         # The matrix is symmetric, and needs pivots off the diagonal only for the pressures.
         factors = splu(reduced.tocsc(), diag_pivot_thresh=1e-4)
         # The depth moves all touching nodes down.

@@ -144,11 +144,10 @@ class Batch:
                 cure="Continue them with --resume, do them anew with --force, or give another "
                 "folder.",
             )
-        begun = read_batch(results / BATCH)
         done = shard_paths(results)
         if done and not self.anew:
             require_same(results / BATCH, self.stated)
-        size = self.shard_size or begun.get("shard_size")
+        size = self.shard_size or read_batch(results / BATCH).get("shard_size")
         size = size or min(max(_SMALLEST, -(-count // _SHARDS)), _LARGEST)
         sized = replace(self, shard_size=size, count=count)
         if not self.anew:

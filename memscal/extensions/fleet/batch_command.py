@@ -16,7 +16,7 @@ import click
 from memscal.cli import output as out
 from memscal.cli.calibrate import calibration_options, calibration_settings
 from memscal.cli.failures import CHECK_FAILED, DONE, debug_option
-from memscal.cli.options import FILE, json_option, option, report_option
+from memscal.cli.options import FILE, files_argument, flag, json_option, option, report_option
 from memscal.errors import MemscalError
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ Examples:
 
 
 @click.command("batch", epilog=EXAMPLES)
-@click.argument("sources", type=FILE, nargs=-1, required=True, metavar="FOLDER|MANIFEST|SCAN...")
+@files_argument("FOLDER|MANIFEST|SCAN...", "sources")
 @option("-o --output results", FILE, metavar="RESULTS", required=True)(
     "Folder of the results, which must not exist yet: tables (Parquet) in RESULTS/shards, "
     "artifacts in RESULTS/artifacts."
@@ -41,7 +41,7 @@ Examples:
 @option("--recipe", FILE, metavar="recipe.toml")(
     "The inputs are tables, read as this file states, which memscal import --save-recipe writes."
 )
-@option("--resume", is_flag=True)(
+@flag("--resume")(
     "Continue in RESULTS: shards stay if their file is whole and is of the same scans and version; "
     "the others are calibrated. Other options than before are refused."
 )
@@ -55,15 +55,15 @@ Examples:
     "Scans of a shard: a task, and a table. What is under way when a batch is killed is lost.  "
     "[default: a 64th of the scans, 4 to 256; with --resume as before]"
 )
-@option("--artifacts", click.Choice(("failed", "all", "none")), "failed")(
+@option("--artifacts", ["failed", "all", "none"], "failed")(
     "Of which calibrations artifacts are written, too: of those with a failed check, all, or none."
 )
 @calibration_options
 @report_option
-@option("--force", is_flag=True)(
+@flag("--force")(
     "Calibrate every scan anew, with whatever options; replace the page of --report, too."
 )
-@option("--dry-run", is_flag=True)("Read every input, say which are refused, and write nothing.")
+@flag("--dry-run")("Read every input, say which are refused, and write nothing.")
 @json_option
 @debug_option
 def command(

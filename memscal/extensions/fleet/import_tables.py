@@ -31,7 +31,7 @@ from memscal.summaries.table import Table
 def import_tables(context: click.Context, options: Options) -> int:
     """Convert tables to files in a folder, and print what was refused; return the exit code."""
     asked = context.params
-    folder: Path = asked["output"]
+    folder = asked["output"]
     recipe = asked["save_recipe"]
     force = asked["force"]
     writing = not asked["dry_run"]

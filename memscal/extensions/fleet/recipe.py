@@ -52,12 +52,12 @@ _IN_COLUMN = re.compile(r"\{(row|col|sensor):([^}]+)\}")
 def read_recipe(context: click.Context, path: Path) -> None:
     """Take what a recipe states as defaults of a command's options, once each fits its option."""
     try:
-        content = tomllib.loads(read_bytes(path, limit=_LONGEST).decode("utf-8"))
+        content = tomllib.loads(read_bytes(path, limit=_LONGEST).decode())
     except (UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
         problem = f"{path.name} is no TOML: {error}."
         raise FormatError(problem, cure="memscal import --save-recipe writes one.") from error
     options = {option.name: option for option in context.command.params}
-    stated: Options = {}
+    stated = {}
     for section, entries in content.items():
         for key, value in entries.items() if isinstance(entries, dict) else [(section, entries)]:
             try:

@@ -77,7 +77,7 @@ class FleetResults(Shown):
 def median(values: FloatArray) -> float:
     """Return the median of what is known, NaN of no values."""
     known = values[np.isfinite(values)]
-    return float(np.median(known)) if known.size else float("nan")
+    return float(np.median(known)) if known.size else np.nan
 
 
 def robust_limit(count: int) -> float:

@@ -144,7 +144,7 @@ def _tolerance_tables(fleet: FleetResults) -> list[Table]:
 def _by_symbol(title: str, found: Mapping[str, Values]) -> Table:
     """Return a row of numbers for each of A and sigma that has them."""
     rows = []
-    heads: list[str] = []
+    heads = []
     for symbol, entry in found.items():
         unit, *numbers = entry.values()
         heads = [key.replace("_", " ") for key in entry if key != "unit"]

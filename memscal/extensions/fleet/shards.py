@@ -72,21 +72,17 @@ def manifest_scans(
         yield from (FleetScan(relative(path, source.parent)) for path in sources)
         return
     if source.is_dir():
-        yield from _folder_scans(source, suffixes)
+        for place, folders, files in os.walk(source):
+            folders.sort()
+            for path in (Path(place, name) for name in sorted(files)):
+                if path.suffix.lower() in suffixes and not path.stem.endswith(_RESULTS):
+                    yield FleetScan(path.relative_to(source).as_posix())
         return
     try:
         lines = read_bytes(source).decode("utf-8-sig").splitlines()
         yield from _listed_scans(source.name, lines)
     except (UnicodeDecodeError, csv.Error) as error:
         raise FormatError(f"{source} is not a table of text: {error}.") from error
-
-
-def _folder_scans(folder: Path, suffixes: tuple[str, ...]) -> Iterator[FleetScan]:
-    for place, folders, files in os.walk(folder):
-        folders.sort()
-        for path in (Path(place, name) for name in sorted(files)):
-            if path.suffix.lower() in suffixes and not path.stem.endswith(_RESULTS):
-                yield FleetScan(path.relative_to(folder).as_posix())
 
 
 def _listed_scans(name: str, lines: Iterable[str]) -> Iterator[FleetScan]:
@@ -144,7 +140,7 @@ def arrow() -> Any:
 
 def _schema(readings: Iterable[Reading]) -> Any:
     """Return names, types and units of the columns, for sensors with readings in some units."""
-    stated = json.loads(_COLUMNS.read_text(encoding="utf-8"))
+    stated = json.loads(_COLUMNS.read_text("utf-8"))
     for parameter in _PARAMETERS:
         units = {ESTIMATED[parameter].read_in(reading).unit_text for reading in readings}
         for name in (parameter, f"{parameter}_errors"):
@@ -213,7 +209,7 @@ def _correlation(covariance: FloatArray) -> FloatArray:
     return np.asarray(correlation[np.triu_indices(u.size, 1)])
 
 
-def write_shard(path: Path, rows: Sequence[Values], digest: str) -> None:
+def write_shard(path: Path, rows: list[Values], digest: str) -> None:
     """Write a table whole or not at all; its metadata state the digest of what it is made from."""
     pa = arrow()
     about = {
@@ -223,7 +219,7 @@ def write_shard(path: Path, rows: Sequence[Values], digest: str) -> None:
         DIGEST: digest,
     }
     readings = {row["reading"] for row in rows if "reading" in row} or {VOLTS}
-    table = pa.Table.from_pylist(list(rows), _schema(readings).with_metadata(about))
+    table = pa.Table.from_pylist(rows, _schema(readings).with_metadata(about))
     packing = {"compression": "zstd", "use_dictionary": False, "write_page_checksum": True}
     sink = pa.BufferOutputStream()
     pa.parquet.write_table(table, sink, **packing)
@@ -365,8 +361,7 @@ def read_fleet(results: Path) -> FleetResults:
             f"{results} holds no results of a batch.",
             cure="Give the folder that memscal batch -o wrote.",
         )
-    pa = arrow()
-    table = pa.concat_tables([read_shard(shard, _SUMMARISED) for shard in shards])
+    table = arrow().concat_tables([read_shard(shard, _SUMMARISED) for shard in shards])
     words = {name: table[name].to_pylist() for name in _WORDS}
     paths = words["path"]
     units = sorted(set(words["unit"]) - {None})

@@ -23,14 +23,14 @@ def trend(fleet: FleetResults, values: FloatArray) -> FloatArray:
         return smooth
     x = fleet.wafer_x[some]
     y = fleet.wafer_y[some]
-    terms = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=1)
+    terms = np.column_stack([np.ones_like(x), x, y, x * x, x * y, y * y])
     # Least absolute deviations, by least squares whose weights come from the step before.
     fitted = np.full(x.size, median(values))
     for _ in range(_STEPS):
         residuals = values[some] - fitted
         smallest = _SMALL * robust_spread(residuals) + TINY
         weights = 1 / np.sqrt(np.hypot(residuals, smallest))
-        weighted = terms * weights[:, np.newaxis]
+        weighted = terms * weights[:, None]
         fitted = terms @ np.linalg.lstsq(weighted, values[some] * weights)[0]
     smooth[some] = fitted
     return smooth

@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import chndtrinc, fdtrc, fdtri, ndtr, ndtri, stdtr, stdtrit
 
-from memscal.model.arrays import TINY, FloatArray, Values, array_record, floats
+from memscal.model.arrays import TINY, FloatArray, Values, array_record
 
 LEVEL = 0.05
 """A change is significant below this probability."""
@@ -88,7 +88,7 @@ def _least_squares(columns: FloatArray, covariance: FloatArray, values: FloatArr
     residual = values - columns @ coefficients
     chi_square = np.sum(residual * np.linalg.solve(covariance, residual), axis=0)
     volume = np.linalg.slogdet(covariance)[1] + np.linalg.slogdet(information)[1]
-    uncertainty = float(np.sqrt(np.linalg.inv(information)[-1, -1]))
+    uncertainty = np.sqrt(np.linalg.inv(information)[-1, -1])
     return _Likely(coefficients[-1], uncertainty, -(volume + chi_square) / 2, chi_square)
 
 
@@ -122,8 +122,7 @@ def own_variance(columns: FloatArray, covariance: FloatArray) -> float:
     """Return the mean variance of a date beside the columns: what dates share is left out."""
     count, parameters = columns.shape
     rest = np.eye(count) - columns @ np.linalg.pinv(columns)
-    mean = np.trace(rest @ covariance) / max(count - parameters, 1)
-    return float(max(mean, TINY))
+    return float(max(np.trace(rest @ covariance) / max(count - parameters, 1), TINY))
 
 
 def change_tests(
@@ -145,7 +144,7 @@ def change_tests(
     found = {name: fit.test(level) for name, fit in changes.items() if fit}
     if not steps:
         return found
-    i = max(steps, key=lambda i: float(steps[i].statistic[0]))
+    i = max(steps, key=lambda i: steps[i].statistic[0])
     largest = steps[i]
     statistic = float(largest.statistic[0])
     # A step or a trend would count as scatter: that is taken from beside the largest step.
@@ -182,7 +181,7 @@ def change_tests(
 def _steps(values: FloatArray, base: FloatArray, covariance: FloatArray) -> dict[int, Fitted]:
     """Fit a step at each date but the first; the last step is that of the newest date alone."""
     dates = np.arange(len(values))
-    fits = {i: fitted(values, base, floats(dates >= i), covariance) for i in dates[1:].tolist()}
+    fits = {i: fitted(values, base, dates >= i, covariance) for i in dates[1:].tolist()}
     return {i: fit for i, fit in fits.items() if fit}
 
 
@@ -202,15 +201,14 @@ def exceeded_after(
     from scipy.optimize import brentq
 
     trend = fitted(history, base, years, covariance)
-    span = float(np.ptp(years))
+    span = np.ptp(years)
     if trend is None:
         return 0.0
     columns = np.column_stack([base, years])
     total = covariance + trend.scatter[0] ** 2 * np.eye(len(years))
     since = years - years[0]
     walk = np.minimum.outer(since, since)
-    own = own_variance(columns, covariance) / span
-    sizes = np.sqrt(own) * _SCATTERS
+    sizes = np.sqrt(own_variance(columns, covariance) / span) * _SCATTERS
     fits = [_least_squares(columns, total + size**2 * walk, history) for size in sizes]
     slopes, errors, likelihood, _ = map(np.ravel, zip(*fits, strict=True))
     weights = np.exp(likelihood - likelihood.max())
@@ -223,4 +221,4 @@ def exceeded_after(
 
     if beyond(_DAY) > 0:
         return 0.0
-    return span if beyond(span) < 0 else float(brentq(beyond, _DAY, span))
+    return span if beyond(span) < 0 else brentq(beyond, _DAY, span)

@@ -2,12 +2,20 @@
 
 import re
 from pathlib import Path
+from typing import Any
 
 import click
 
 from memscal.cli import output as out
 from memscal.cli.failures import CHECK_FAILED, DONE
-from memscal.cli.options import FILE, figure_option, option, output_options
+from memscal.cli.options import (
+    FILE,
+    figure_option,
+    files_argument,
+    option,
+    output_options,
+    repeatable,
+)
 from memscal.formats.files import together
 
 EXAMPLES = """\b
@@ -27,14 +35,14 @@ def _tolerance(*given: str) -> float:
 
 
 @click.command("history", epilog=EXAMPLES)
-@click.argument("artifacts", type=FILE, nargs=-1, required=True, metavar="ARTIFACT...")
+@files_argument("ARTIFACT...", "artifacts")
 @option("-o --output", FILE, metavar="FILE.html")(
     "Page to write, without other files, network or scripts."
 )
 @option("--tolerance", "A=PERCENT", "A=2%", callback=_tolerance)(
     "Change of A that is allowed until the next calibration."
 )
-@option("--repair repairs", "DATE", multiple=True)(
+@repeatable("--repair repairs", "DATE")(
     "Date of a repair, such as 2026-03-01: what is before it is shown, not tested. Repeated."
 )
 @figure_option("Draw A and sigma by date.")
@@ -42,11 +50,10 @@ def _tolerance(*given: str) -> float:
 def command(
     artifacts: tuple[Path, ...],
     output: Path | None,
-    tolerance: float,
-    repairs: tuple[str, ...],
     figures: tuple[Path, ...],
     as_json: bool,
     force: bool,
+    **options: Any,
 ) -> int:
     """Say whether a sensor has changed between its calibrations, and when the next one is due.
 
@@ -57,7 +64,7 @@ def command(
     from memscal.extensions.history.history import history
 
     out.prove_writable([output, *figures], force=force, inputs=artifacts)
-    found = history(artifacts, tolerance=tolerance, repairs=repairs)
+    found = history(artifacts, **options)
     files = out.drawn(found, figures, output)
     with together():
         out.write_files(files, force=force)

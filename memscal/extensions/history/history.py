@@ -34,6 +34,9 @@ from memscal.model.quantities import PER_MM
 from memscal.model.result import Shown
 from memscal.summaries.table import percent
 
+Calibrations = Sequence[ApparatusFunction]
+"""Artifacts of one sensor by their dates."""
+
 _DAYS = 365.25
 FEWEST = 4
 """Dates below which no date of the next calibration is proposed."""
@@ -231,7 +234,7 @@ def history(
     own = covariances[:, tested[:, None], tested]
     since = years[tested]
     marked = [marks[i] for i in tested]
-    tests: list[Values] = []
+    tests = []
     for i, share in enumerate(_SHARES):
         found = change_tests(values[i, tested], base, own[i], since, marked, share * LEVEL)
         for test, result in found.items():
@@ -308,7 +311,7 @@ def moment_of(text: str) -> datetime:
     return moment.replace(tzinfo=moment.tzinfo or UTC).astimezone(UTC)
 
 
-def _require_one_sensor(read: Sequence[ApparatusFunction]) -> None:
+def _require_one_sensor(read: Calibrations) -> None:
     """Refuse artifacts that do not measure the same quantity with one sensor."""
     if len(read) < 2:
         raise InputError(
@@ -333,7 +336,7 @@ def _require_one_sensor(read: Sequence[ApparatusFunction]) -> None:
 
 
 def _quantities(
-    read: Sequence[ApparatusFunction],
+    read: Calibrations,
 ) -> tuple[tuple[str, ...], FloatArray, FloatArray]:
     """Return names, logarithms (q, n) less the first date's, and covariances (q, n, n)."""
     k = shared.common_wavenumbers(read)
@@ -344,13 +347,13 @@ def _quantities(
     with_sigma = np.sum(within * joint[0, 1]) / np.sum(within * joint[1, 1])
     rows = np.insert(np.eye(len(values)), 2, 0.0, axis=0)
     rows[2, :2] = 1.0, -with_sigma
-    covariances: FloatArray = np.einsum("aq,ap,qpij->aij", rows, rows, joint)
+    covariances = np.einsum("aq,ap,qpij->aij", rows, rows, joint)
     transfers = (f"A G({number / PER_MM:g} rad/mm)" for number in k)
     names = ("A", "sigma", "A at unchanged sigma", *transfers)
     return names, rows @ (values - values[:, :1]), covariances
 
 
-def _temperatures(read: Sequence[ApparatusFunction]) -> FloatArray | None:
+def _temperatures(read: Calibrations) -> FloatArray | None:
     """Return temperatures less their mean, in K, where they differ and all dates state one."""
     stated = [one.sensor.temperature for one in read if one.sensor.temperature is not None]
     if len(stated) < max(len(read), FEWEST) or np.ptp(stated) < _LEAST_SPREAD:
@@ -360,7 +363,7 @@ def _temperatures(read: Sequence[ApparatusFunction]) -> FloatArray | None:
 
 def _repairs(
     repaired: Sequence[str],
-    read: Sequence[ApparatusFunction],
+    read: Calibrations,
     segment: IndexArray,
     values: FloatArray,
     covariance: FloatArray,
@@ -368,22 +371,18 @@ def _repairs(
     """Yield each repair, the last calibration before it, and how A differs after it."""
     for i, date in enumerate(repaired):
         around = np.flatnonzero((segment == i) | (segment == i + 1))
-        after = floats(segment[around] > i)
-        fit = fitted(
-            values[around],
-            np.ones((around.size, 1)),
-            after,
-            covariance[np.ix_(around, around)],
-        )
+        ones = np.ones((around.size, 1))
+        own = covariance[np.ix_(around, around)]
+        fit = fitted(values[around], ones, floats(segment[around] > i), own)
         before = np.flatnonzero(segment <= i)
         last = read[before[-1]].start_time if before.size else None
         change = fit.stated("1") if fit else None
         yield {"date": date, "last_before": last, "change": change}
 
 
-def _messages(read: Sequence[ApparatusFunction]) -> Iterator[Message]:
+def _messages(read: Calibrations) -> Iterator[Message]:
     """Yield what weakens the history, and what would mend it."""
-    numbered = [bool(one.sensor.serial_number) for one in read]
+    numbered = [one.sensor.serial_number for one in read]
     failed = "failed a quality check."
     lacking = {
         failed: [not one.passed for one in read],

@@ -85,7 +85,7 @@ def logarithms(apparatus: ApparatusData, k: FloatArray) -> FloatArray:
     profile = apparatus.radial_profile
     a = apparatus.conversion_constant
     transfer = hankel_transform(profile.r, profile.g, k) if k.size else k
-    return floats(np.log([a, apparatus.gaussian_sigma, *(a * transfer)]))
+    return np.log([a, apparatus.gaussian_sigma, *(a * transfer)])
 
 
 def _effects(apparatus: ApparatusData, source: str, k: FloatArray) -> FloatArray:

@@ -8,7 +8,7 @@ import numpy as np
 
 from memscal.extensions.history.changes import LEVEL
 from memscal.extensions.history.history import History, moment_of
-from memscal.model.arrays import FloatArray, Values, floats
+from memscal.model.arrays import FloatArray, Values
 from memscal.model.notation import format_measured
 from memscal.summaries.declared import parameters_json
 from memscal.summaries.table import Table, percent, texts_of
@@ -138,7 +138,7 @@ def _changes(history: History) -> list[tuple[str, ...]]:
 def _of_differences(covariance: FloatArray) -> FloatArray:
     """Return the standard uncertainties (n, n) of differences between dates."""
     own = np.diag(covariance)
-    return floats(np.sqrt(np.maximum(np.add.outer(own, own) - 2 * covariance, 0.0)))
+    return np.sqrt(np.maximum(np.add.outer(own, own) - 2 * covariance, 0.0))
 
 
 def _pairs(history: History) -> Iterator[Values]:

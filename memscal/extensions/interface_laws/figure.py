@@ -61,9 +61,8 @@ def interface_figure(comparison: FrictionComparison | InterfaceComparison) -> Fi
 def _draw_lengths(axes: Axes, by_direction: dict[str, LawComparison]) -> None:
     for direction, compared in by_direction.items():
         place = bounded(compared.length.values, _MIDDLE)
-        rise = deviance_rise(compared.length)
         label = f"{direction}, {lubricated_words(compared.lubrication)}"
-        axes.plot(place, rise, color=_COLOURS[direction], label=label)
+        axes.plot(place, deviance_rise(compared.length), color=_COLOURS[direction], label=label)
     draw_levels(axes)
     names = ["∞" if np.isinf(tick) else f"{tick:g}" for tick in _TICKS]
     axes.xaxis.set_ticks(bounded(np.array(_TICKS) * _UM, _MIDDLE), names)

@@ -41,7 +41,7 @@ from memscal.friction.marginal_likelihood import (
     log_uniform_prior,
 )
 from memscal.friction.results import BoundedEstimate, Interval
-from memscal.model.arrays import BoolArray, FloatArray, Values, array_record, require_positive
+from memscal.model.arrays import BoolArray, FloatArray, array_record, require_positive
 from memscal.model.bayes_factor import BayesFactor
 from memscal.model.checks import Message
 from memscal.model.measured_stress import MeasuredProfile
@@ -155,7 +155,7 @@ def compare_interface(
     lubricated = [profile for profile in profiles if profile.lubrication == "lubricated"]
     dry = [profile for profile in profiles if profile.lubrication != "lubricated"]
     scan = profiles[0].scan
-    contacts: Values = {
+    contacts = {
         "film": scan.film,
         "indenter": scan.indenter,
         "reach": _REACH * max(profile.r[-1] for profile in profiles),

@@ -51,6 +51,8 @@ _HDF5_ENDINGS = (".h5", ".hdf5", ".hdf")
 _ADDRESS = re.compile(rb"<DataItem\b[^<>]{0,1000}>\s{0,200}([^<>:]{0,200}):([^<>]{1,500})<")
 ByName = dict[str, NDArray[Any]]
 """Arrays of a mesh file by their names."""
+Numbers = list[NDArray[Any]]
+"""The same by the numbers that a header gives them."""
 
 _AS_VTU = (
     "Save it from ParaView as an unstructured grid (.vtu) in one piece, of data mode ASCII or "
@@ -97,9 +99,7 @@ def heavy_arrays(data: bytes, path: str) -> tuple[ByName, list[SourceFile]]:
     return arrays, [file.source for file in files.values()]
 
 
-def run_meshio(
-    data: bytes, kind: str, name: str, heavy: ByName
-) -> tuple[Values, list[NDArray[Any]]]:
+def run_meshio(data: bytes, kind: str, name: str, heavy: ByName) -> tuple[Values, Numbers]:
     """Return what meshio makes of a mesh: a header, and the arrays that it numbers."""
     size = len(data) + sum(values.nbytes for values in heavy.values())
     seconds = _SECONDS + size / _BYTES_PER_SECOND
@@ -184,7 +184,7 @@ _MAX_NOTES = 4000
 
 def is_mesh(path: FilePath) -> bool:
     """Return whether a file's name says that it is a mesh and not a table."""
-    ending = os.path.splitext(os.fspath(path))[1].lower()
+    ending = Path(path).suffix.lower()
     return ending in _KINDS or ending in _OTHERS
 
 
@@ -227,9 +227,8 @@ class Mesh:
 
 def read_mesh(path: FilePath) -> Mesh:
     """Read a mesh and its fields from a VTU, legacy VTK or XDMF file."""
-    shown = os.fspath(path)
-    name = os.path.basename(shown)
-    kind = _KINDS.get(os.path.splitext(shown)[1].lower())
+    name = Path(path).name
+    kind = _KINDS.get(Path(path).suffix.lower())
     if kind is None:
         raise FormatError(
             f"{name} is not a mesh of a kind that is read.",
@@ -238,13 +237,13 @@ def read_mesh(path: FilePath) -> Mesh:
             "stress at the base as a table (CSV).",
         )
     installed("meshio", "A mesh", "fem-io")
-    data = read_bytes(shown)
+    data = read_bytes(path)
     if not data:
         raise FormatError(f"{name} is empty.", cure="Save the mesh again.")
     sources = [SourceFile(name, hashlib.sha256(data).hexdigest())]
     heavy: ByName = {}
     if kind == "xdmf":
-        heavy, drawn = heavy_arrays(data, shown)
+        heavy, drawn = heavy_arrays(data, os.fspath(path))
         sources += drawn
     with damage_named(f"{name} cannot be read as a mesh", why="Its reader gave no mesh back"):
         header, arrays = run_meshio(data, kind, name, heavy)
@@ -253,7 +252,7 @@ def read_mesh(path: FilePath) -> Mesh:
 
 def _checked(
     header: Values,
-    arrays: list[NDArray[Any]],
+    arrays: Numbers,
     sources: tuple[SourceFile, ...],
     *,
     tensor_order: bool,
@@ -280,7 +279,7 @@ def _checked(
 
 
 def _cells(
-    blocks: list[Values], arrays: list[NDArray[Any]], points: int, source: SourceFile
+    blocks: list[Values], arrays: Numbers, points: int, source: SourceFile
 ) -> Iterator[Cells]:
     """Yield the blocks that have cells, with their nodes as whole numbers below ``points``."""
     for block in blocks:

@@ -381,9 +381,8 @@ def _require_order(mesh: Mesh, frame: Frame, base: Base, shear: Component, zero:
 
 def _at_base(mesh: Mesh, frame: Frame, base: Base, component: Component) -> ArrayPair:
     """Return places in the base and the values there: at nodes, or at the middles of sides."""
-    radial = list(frame.radial)
     if component.at_points:
-        places = frame.points[base.nodes][:, radial]
+        places = frame.points[base.nodes][:, frame.radial]
         return places, mesh.point_data[component.field][base.nodes, component.column]
     blocks = [block for block in base.cells if component.field in block[0].data]
     if not sum(len(cells) for _, cells, _ in blocks):
@@ -392,7 +391,7 @@ def _at_base(mesh: Mesh, frame: Frame, base: Base, component: Component) -> Arra
             f"{mesh.source.file_name}.",
             cure="Name the position of the base (base; --base), or save the stress at the nodes.",
         )
-    places = np.concatenate([middles for _, _, middles in blocks])[:, radial]
+    places = np.concatenate([middles for _, _, middles in blocks])[:, frame.radial]
     values = [block.data[component.field][cells, component.column] for block, cells, _ in blocks]
     return places, np.concatenate(values)
 

@@ -183,8 +183,7 @@ class DrawnScans:
         references = self.solution.estimate.model.references
         changes = []
         for true, nominal, own in zip(self._rods(scans), self._nominal, references, strict=True):
-            blank = np.zeros_like(nominal)
-            ratio = np.divide(own.values, nominal, out=blank, where=nominal != 0)
+            ratio = np.divide(own.values, nominal, out=np.zeros_like(nominal), where=nominal != 0)
             changes.append(replace(own, values=(true - nominal) * ratio))
         return tuple(changes)
 

@@ -52,7 +52,6 @@ from memscal.model.arrays import (
     FloatArray,
     IndexArray,
     Values,
-    floats,
     keyword_array_record,
 )
 from memscal.model.checks import FAILED_CHECK, NOISE_UNSTATED, QualityCheck, check
@@ -94,12 +93,12 @@ def _predicted(
 ) -> Predicted:
     """Return what the sensor reads of members, each about the centre that fits it best."""
     nodes: Any = members.wavenumbers
-    signal = _along(nodes, sensor.transfer * members.spectra[:, load])
+    signal = sensor.transfer * members.spectra[:, load] @ nodes.waves.T
     slope = np.gradient(signal, nodes.line, axis=1)
     places, centre = _best_places(points, nodes, signal, slope)
 
     def at_points(spectra: FloatArray) -> FloatArray:
-        return _read(_along(nodes, spectra), places)
+        return _read(spectra @ nodes.waves.T, places)
 
     by_centre = -points.way * _read(slope, places)
     from_axis = -by_centre * np.sign(points.offset)
@@ -114,15 +113,10 @@ def _predicted(
     return replace(predicted, signal=signal, columns={**predicted.columns, **own})
 
 
-def _along(nodes: LineNodes, spectra: FloatArray) -> FloatArray:
-    """Inverse transforms (V, m) of spectra (V, K) along the line of the nodes."""
-    return spectra @ nodes.waves.T
-
-
 def _read(values: FloatArray, places: FloatArray) -> FloatArray:
     """Read values (V, m) at places (V, n) along the line, in its steps."""
     rows = np.broadcast_to(np.arange(len(values))[:, None], places.shape)
-    return floats(map_coordinates(values, [rows, places], mode="nearest"))
+    return map_coordinates(values, [rows, places], mode="nearest")
 
 
 #: Steps by which a centre is found, and the longest of them in those of the line.
@@ -193,8 +187,9 @@ def compare_sliding(
     tested = measured.noise_stated
     if not tested:
         # Readings scatter by more than their noise about a round stress.
-        found = _by(keys, fit)
-        points = [_of_noise(p, found[key]) for p, key in zip(points, keys, strict=True)]
+        scatter = {key: math.sqrt(e.least / e.degrees) for key, e in _by(keys, fit).items()}
+        pairs = zip(points, keys, strict=True)
+        points = [replace(p, noise=scatter[key] * p.noise) for p, key in pairs]
         channel = replace(channel, points=points)
         fit = fit_friction(channel)
         least = min(p.noise.min() for p in points)
@@ -247,11 +242,6 @@ def _joint(
     return joint
 
 
-def _of_noise(points: SlidingPoints, found: BoundedEstimate) -> SlidingPoints:
-    """Return the points of a pass with the noise by which they scatter about a fit."""
-    return replace(points, noise=math.sqrt(found.least / found.degrees) * points.noise)
-
-
 def _groups(keys: Sequence[Any]) -> dict[Any, list[int]]:
     """Return which of the keys are alike."""
     groups: dict[Any, list[int]] = {}
@@ -301,7 +291,7 @@ def _points(
                 why="Friction shifts the stress ahead of the indenter.",
                 cure="State it (/entry/data/direction): memscal import --sliding forth or back.",
             )
-        own: Values = {
+        own = {
             "offset": single.offset + centres[i] - middle,
             # Outliers were told by a round stress.
             "noise": profile.points["zz"].noise,

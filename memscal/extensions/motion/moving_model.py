@@ -67,9 +67,8 @@ class MovingModel(ForwardModel):
         axis = _axes(whole)
         positions[axis, np.arange(axis.size)] = np.concatenate([line.x for line in lines])
         x, y = positions
-        one = np.ones_like(x)
-        own = {"averaging": 0 * points.averaging, "velocity": 0 * x}
-        return forward_model(replace(whole, x=x, y=y, load=one, **own), self.references)
+        own = {"averaging": 0 * points.averaging, "velocity": 0 * x, "load": np.ones_like(x)}
+        return forward_model(replace(whole, x=x, y=y, **own), self.references)
 
     def geometry(self, centres: FloatArray) -> Geometry:
         """Return that of the still sensor on the grids."""
@@ -80,7 +79,7 @@ class MovingModel(ForwardModel):
         voltages = np.empty((self.points.u.size, *still.shape[1:]))
         for line in self._lines(dynamics):
             voltages[line.rows] = line.weights @ still[line.columns]
-        return floats((voltages.T * self.points.load).T)
+        return (voltages.T * self.points.load).T
 
     def _lines(self, dynamics: Dynamics | None) -> Iterator[_Line]:
         """Yield the lines of all scans, read by a sensor of some dynamics."""
@@ -93,9 +92,9 @@ class MovingModel(ForwardModel):
         start = 0
         for number in range(line.max() + 1):
             rows = np.flatnonzero(line == number)
-            averaging = float(points.averaging[points.scan[rows[0]]].max())
+            averaging = points.averaging[points.scan[rows[0]]].max()
             arrays = (along[rows].tobytes(), points.velocity[rows].tobytes())
-            x, weights = _weights(*arrays, float(self.k[-1]), averaging, dynamics)
+            x, weights = _weights(*arrays, self.k[-1], averaging, dynamics)
             yield _Line(rows, slice(start, start + x.size), x, weights)
             start += x.size
 
@@ -174,4 +173,4 @@ def _weights(
     if dynamics:
         waves *= transfer(dynamics, np.outer(speed, k) / (2 * np.pi))
     waves[:, 1:] *= 2
-    return x, floats((waves @ np.exp(-1j * np.outer(k, x))).real / period)
+    return x, (waves @ np.exp(-1j * np.outer(k, x))).real / period

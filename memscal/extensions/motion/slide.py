@@ -31,7 +31,7 @@ from memscal.errors import ConvergenceError, DomainError, InputError
 from memscal.extensions.motion.sliding_contact import Region, SlidingContact
 from memscal.mechanics.film_response import corrections, half_space_coupling
 from memscal.mechanics.indent import indent
-from memscal.model.arrays import FloatArray, floats
+from memscal.model.arrays import ArrayPair, FloatArray, floats
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Indenter, Rod
 from memscal.parallel import single_threaded
@@ -194,7 +194,7 @@ def _balanced(heights: FloatArray, influence: FloatArray, total: float) -> tuple
     waves = rfft2(influence)
     inside = heights < heights[0].min()  # a disc
 
-    def pressed(unknown: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def pressed(unknown: FloatArray) -> ArrayPair:
         """Return pressures by depth and those inside, and how far they depress the film below."""
         pressure = np.zeros_like(heights)
         pressure[inside] = unknown[1:]
@@ -224,8 +224,7 @@ def _influence(step: float, cells: int, poisson_ratio: float, friction: float) -
     """Depression by a pressure on the first cell and its shear, at lags up to ``cells``."""
     count = next_fast_len(2 * cells + int(_BETWEEN_IMAGES / step))
     along_x = rfftfreq(count, step)
-    along_y = fftfreq(count, step)
-    frequency = np.hypot.outer(along_y, along_x)
+    frequency = np.hypot.outer(fftfreq(count, step), along_x)
     frequency[0, 0] = _SMALLEST
     normal, coupling, _ = corrections(2 * np.pi * frequency, poisson_ratio)
     by_shear = friction * along_x / frequency * (half_space_coupling(poisson_ratio) + coupling)

@@ -25,12 +25,7 @@ from memscal.axisymmetry.hankel import Wavenumbers, bessel_table
 from memscal.extensions.motion.slide import slide
 from memscal.extensions.motion.sliding_contact import SlidingContact
 from memscal.friction.family import FamilySetup, LoadingPath, ProfileFamily
-from memscal.model.arrays import (
-    FloatArray,
-    Values,
-    array_record,
-    floats,
-)
+from memscal.model.arrays import FloatArray, Values, array_record
 
 SLIDING = "sliding"
 """The loading of a sphere that slides."""
@@ -75,7 +70,7 @@ class LineNodes(Wavenumbers):
         k = self.k[: self.k.size // _ORDERS]
         sides = np.sign(x)[:, None]
         orders = [sides**m * bessel_table(abs(x), k, m) for m in range(_ORDERS)]
-        return floats(np.hstack(orders) * self.weights)
+        return np.hstack(orders) * self.weights
 
 
 def line_spectrum(contact: SlidingContact, k: FloatArray) -> FloatArray:
@@ -122,7 +117,6 @@ def sliding_family(setting: Values) -> ProfileFamily:
         weights=np.tile(round_nodes.weights, _ORDERS),
         line=step * np.arange(-half, half + 1),
     )
-    values = np.array(FRICTIONS)
     paths = [SlidingPath(**vars(setup.path(friction=mu, loading=SLIDING))) for mu in FRICTIONS]
-    solved = setup.family(paths, name=SLIDING, loading=SLIDING, values=values)
+    solved = setup.family(paths, name=SLIDING, loading=SLIDING, values=np.array(FRICTIONS))
     return replace(solved, scale=_SCALE, interpolation="CubicSpline")

@@ -9,7 +9,7 @@ from memscal.model.quantities import Quantity
 from memscal.summaries.declared import members
 from memscal.summaries.table import Table
 
-_ROWS = tomllib.loads(Path(__file__).with_name("sliding.toml").read_text(encoding="utf-8"))
+_ROWS = tomllib.loads(Path(__file__).with_name("sliding.toml").read_text("utf-8"))
 _QUANTITIES = [Quantity(**row) for row in _ROWS["quantity"]]
 
 

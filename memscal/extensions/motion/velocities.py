@@ -63,7 +63,7 @@ def sliding_speed(scan: Scan) -> float | None:
                 cure="Correct the directions (--sliding), or the sign of the positions.",
             )
     passes = np.broadcast_to(scan.passes, velocity.shape)
-    each = [float(np.median(np.abs(velocity[passes == i]))) for i in np.unique(passes)]
+    each = [np.median(np.abs(velocity[passes == i])) for i in np.unique(passes)]
     if max(each) > _ALIKE * min(each):
         low, high = (f"{1e3 * speed:.2g}" for speed in (min(each), max(each)))
         raise InputError(

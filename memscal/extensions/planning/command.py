@@ -24,6 +24,7 @@ from memscal.cli.options import (
     option,
     output_options,
     radius_options,
+    repeatable,
     rod_friction_option,
     si,
 )
@@ -87,11 +88,11 @@ def _target(value: str) -> tuple[str, float]:
 @option("--method", default="bayesian")(
     "Method of memscal calibrate with which the scan would be evaluated."
 )
-@option("--want targets", _target, multiple=True, metavar="TARGET")(
+@repeatable("--want targets", _target, metavar="TARGET")(
     "What to reach by --vary: A=1%, sigma=1% or fwhm=5% at most, relative standard "
     "uncertainty, or resolved=4 at least, in rad/mm. Repeated: all are to be reached."
 )
-@option("--vary", click.Choice(("step", "half-range", "repeats")))(
+@option("--vary", ["step", "half-range", "repeats"])(
     "What to vary for --want: the coarsest step, shortest range or fewest repeats is found."
 )
 @figure_option("Draw the expected result.")

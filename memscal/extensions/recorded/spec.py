@@ -19,11 +19,9 @@ class SpecScan(TextTable):
     """The table of one scan, by the number after #S or counted from 1; of several one is chosen."""
 
     def __init__(self, path: FilePath, *, scan: int | None = None, **reading: Any) -> None:
-        self._scan = scan
+        self._scan = None if scan is None else self._place_of(path, scan)
         self._scans = 0
         self._labelled = False
-        if scan is not None:
-            self._scan = self._place_of(path, scan)
         super().__init__(path, **reading)
 
     @staticmethod

@@ -40,7 +40,7 @@ def open_channels(path: FilePath, named: Values, **reading: Any) -> RecordedColu
     name = PurePath(path).name
     data = read_bytes(path)
     nptdms = installed("nptdms", "A TDMS file", "recorded")
-    channels: Values = {}
+    channels = {}
     with damage_named(f"{name} cannot be read as TDMS"), _warnings_refused():
         _require_whole(name, data)
         file = nptdms.TdmsFile.open(io.BytesIO(data))
@@ -52,7 +52,9 @@ def open_channels(path: FilePath, named: Values, **reading: Any) -> RecordedColu
         arrays = channels | {column: channel[:] for column, channel in used.items()}
         units = [_unit_of(channel) for channel in channels.values()]
         signal = used.get(named["u_zz"], ())
-        step = _time_step(signal.properties) if signal else 0.0
+        waveform = signal.properties if signal else {}
+        timed = waveform.get("wf_xunit_string") in (None, "", "s")
+        step = float(waveform.get(_TIME, 0.0)) if timed else 0.0
     _require_one_clock(name, used)
     defaults = {}
     if step > 0:
@@ -120,12 +122,6 @@ def _unit_of(channel: Any) -> str:
     stated = [channel.properties[name] for name in _UNITS if channel.properties.get(name)]
     unit = str([*stated, *cut_head(channel.name)[1:], ""][0]).strip()
     return unit if is_unit(unit) else unit.lower()  # Volts
-
-
-def _time_step(properties: Values) -> float:
-    """Return the time between readings, in s; 0 where a waveform states none."""
-    timed = properties.get("wf_xunit_string") in (None, "", "s")
-    return float(properties.get(_TIME, 0.0)) if timed else 0.0
 
 
 def _require_one_clock(name: str, channels: Values) -> None:

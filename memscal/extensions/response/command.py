@@ -2,6 +2,7 @@
 
 import math
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -13,6 +14,7 @@ from memscal.cli.options import (
     figure_option,
     option,
     output_options,
+    repeatable,
 )
 from memscal.formats.files import together
 
@@ -26,10 +28,10 @@ Examples:
 
 @click.command("response", epilog=EXAMPLES)
 @artifact_argument
-@option("--wavelength wavelengths", Quantity("mm"), multiple=True, required=True)(
+@repeatable("--wavelength wavelengths", Quantity("mm"), required=True)(
     "Wavelength of the pressure along the film, in mm. May be repeated."
 )
-@option("--speed speeds", Quantity("mm/s"), multiple=True)(
+@repeatable("--speed speeds", Quantity("mm/s"))(
     "Speed with which it passes the sensor, in mm/s. May be repeated."
 )
 @option("--friction", Quantity("ratio", low=-math.inf), 0.0)(
@@ -45,12 +47,10 @@ def command(
     artifact: Path,
     wavelengths: tuple[float, ...],
     speeds: tuple[float, ...],
-    friction: float,
-    noise_record: Path | None,
-    length: float | None,
     figures: tuple[Path, ...],
     as_json: bool,
     force: bool,
+    **options: Any,
 ) -> None:
     """Find what a calibrated sensor (ARTIFACT) reads of waves of pressure on its film.
 
@@ -58,17 +58,10 @@ def command(
     calibration does not resolve has none. With a noise record, a speed and a length, the smallest
     amplitude is found that is seen at three standard uncertainties.
     """
-    out.prove_writable(figures, force=force, inputs=[artifact, noise_record])
+    out.prove_writable(figures, force=force, inputs=[artifact, options["noise_record"]])
     from memscal.extensions.response.response import response
 
-    seen = response(
-        artifact,
-        wavelengths,
-        speeds or None,
-        friction=friction,
-        noise_record=noise_record,
-        length=length,
-    )
+    seen = response(artifact, wavelengths, speeds or None, **options)
     files = out.drawn(seen, figures)
     with together():
         out.write_files(files, force=force)

@@ -41,7 +41,6 @@ def response_figure(seen: Response) -> Figure:
     # Where no wave has a smallest stress, there is none to draw.
     heard = bool(np.isfinite(seen.smallest_stress).any())
     if heard:
-        assert seen.length is not None  # it is given with a noise record
         longest = seen.length
     wavelength = np.geomspace(shortest, longest, _FINE)
     with panels_of(3.4, 1, 1 + heard, squeeze=False) as (figure, [panels]):

@@ -4,13 +4,11 @@ import math
 
 import numpy as np
 
-from memscal.extensions.response.response import Response, Wave
+from memscal.extensions.response.response import Response
 from memscal.model.arrays import Values
 from memscal.model.quantities import MM, Quantity, measured
 from memscal.summaries.declared import cell, members
 from memscal.summaries.table import Table
-
-_NOT_RESOLVED = "not resolved"
 
 
 def _quantities(seen: Response) -> tuple[Quantity, ...]:
@@ -61,11 +59,13 @@ def tables(seen: Response) -> list[Table]:
     heard = seen.noise_record is not None
     head = ["wavelength (mm)"] + ["speed (mm/s)"] * timed + ["gain", "phase (rad)"]
     head += ["frequency (Hz)"] * timed + ["smallest stress (Pa)"] * heard
+    gain = _quantities(seen)[1]
     rows = []
     for wave in seen.waves:
         row = [f"{wave.wavelength / MM:.4g}"]
         row += [f"{wave.frequency * wave.wavelength / MM:.4g}"] * timed
-        row += _gain_cells(seen, wave)
+        phase = f"{wave.phase:.3f}"
+        row += [cell(gain, wave), phase] if wave.resolved else ["not resolved", "-"]
         row += [f"{wave.frequency:.4g}"] * timed
         row += ["-" if math.isnan(wave.smallest_stress) else f"{wave.smallest_stress:.3g}"] * heard
         rows.append(row)
@@ -73,10 +73,3 @@ def tables(seen: Response) -> list[Table]:
     if seen.friction:
         title += f", with a shear of {seen.friction:.4g} times the pressure"
     return [Table(title, head, rows)]
-
-
-def _gain_cells(seen: Response, wave: Wave) -> list[str]:
-    if not wave.resolved:
-        return [_NOT_RESOLVED, "-"]
-    gain = _quantities(seen)[1]
-    return [cell(gain, wave), f"{wave.phase:.3f}"]

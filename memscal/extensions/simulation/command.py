@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from inspect import signature
 from itertools import chain
@@ -24,6 +24,7 @@ from memscal.cli.options import (
     Quantity,
     film_from,
     film_options,
+    flag,
     indenter_from,
     kernel_from,
     kernel_options,
@@ -32,6 +33,7 @@ from memscal.cli.options import (
     options_of,
     output_options,
     radius_options,
+    repeatable,
     rod_friction_option,
     with_laboratory,
 )
@@ -65,7 +67,7 @@ def _rows_and_columns(_: Any, __: Any, text: str | None) -> tuple[int, int] | No
 
 
 _sphere_options = options_of(
-    option("--lubricated-load lubricated_loads", Quantity("N"), (0.69, 2.75), multiple=True)(
+    repeatable("--lubricated-load lubricated_loads", Quantity("N"), (0.69, 2.75))(
         "Sphere: load of the lubricated contacts, in N. May be repeated."
     ),
     option("--sphere-radius", Quantity("mm"), 128.8)("Sphere: radius of curvature, in mm."),
@@ -75,7 +77,7 @@ _sphere_options = options_of(
     option("--friction", NonNegative("ratio", infinite=True), 0.2, metavar="MU")(
         "Sphere: friction coefficient of the dry contacts; inf: they stick wherever they touch."
     ),
-    option("--loading", click.Choice(["incremental", "total"]), "incremental")(
+    option("--loading", ["incremental", "total"], "incremental")(
         "Sphere: a point sticks where it first touched, or as if loaded in one step."
     ),
     interface_options,
@@ -84,18 +86,18 @@ _sphere_options = options_of(
     option("--load-scatter", NonNegative("percent", high=10.0), 2.0)(
         "Sphere: standard deviation of each contact's own load, in percent."
     ),
-    option("--record-loads", is_flag=True)(
+    flag("--record-loads")(
         "Sphere: record the load that each contact had, read to 0.2 percent, in place of "
         "the nominal one."
     ),
     option("--position-error", NonNegative("um"), 10.0)(
         "Sphere: standard deviation of each contact's own position, in um."
     ),
-    option("--draw-inputs", is_flag=True)(
+    flag("--draw-inputs")(
         "Sphere: draw the true film, radii and loads from their uncertainties; the files "
         "state the nominal ones, and the truth beside."
     ),
-    option("--one-load-cell", is_flag=True)(
+    flag("--one-load-cell")(
         "Sphere: its loads and the rod's have one common error, and the scans name one load cell."
     ),
     option("--gain", Quantity("ratio"), 1.0)(
@@ -137,7 +139,7 @@ def _print_truth(scans: Mapping[Path, Scan], title: str) -> None:
 
     truths = [dict(scan.synthetic or {}) for scan in scans.values()]
     names = dict.fromkeys(chain(*sorted(truths, key=len, reverse=True)))
-    rows: list[Sequence[str]] = [
+    rows = [
         ("kind", *(scan.kind for scan in scans.values())),
         ("points", *(" x ".join(map(str, scan.u_zz.shape)) for scan in scans.values())),
     ]
@@ -163,7 +165,7 @@ def _described(scan: Scan, path: Path) -> Options:
         "scan": str(path),
         "synthetic": True,
         "kind": scan.kind,
-        "shape": list(scan.u_zz.shape),
+        "shape": scan.u_zz.shape,
         "truth": {name: _member(name, value) for name, value in (scan.synthetic or {}).items()},
     }
 
@@ -219,7 +221,7 @@ Examples of an experiment: a rod scan to calibrate with, and a sphere's contacts
 
 
 @click.command("simulate", epilog=EXAMPLES)
-@option("--experiment", click.Choice(["rod", "sphere"]), "rod")(
+@option("--experiment", ["rod", "sphere"], "rod")(
     "A rod scan; or a whole experiment with a sphere: a rod scan, and scans of the sphere's "
     "contacts, dry and lubricated."
 )
@@ -228,7 +230,7 @@ Examples of an experiment: a rod scan to calibrate with, and a sphere's contacts
     "[default: synthetic_scan.h5, or synthetic_experiment]"
 )
 @kernel_options
-@option("--load loads", Quantity("N"), multiple=True)(
+@repeatable("--load loads", Quantity("N"))(
     "Normal load, in N. Repeated: one scan at each.  [default: 1; of a sphere's dry contacts "
     "0.34, 0.69, 1.37 and 2.75]"
 )
@@ -246,7 +248,7 @@ Examples of an experiment: a rod scan to calibrate with, and a sphere's contacts
 @option("--repeats", click.IntRange(min=1, max=4096), 1)(
     "Repeats at each load; with a sphere, of its contacts."
 )
-@option("--raster", is_flag=True)(
+@flag("--raster")(
     "Rod scan alone: a square instead of a line, as several rows of sensors always are."
 )
 @option("--array", "ROWSxCOLUMNS", callback=_rows_and_columns)(

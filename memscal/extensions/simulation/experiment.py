@@ -38,11 +38,10 @@ class Reality:
     load_scale: float = 1.0
 
 
-def drawn(
-    stated: Reality, load_uncertainty: float, seed: int, *, one_load_cell: bool = False
-) -> Reality:
+def drawn(stated: Reality, disturbances: Disturbances, seed: int) -> Reality:
     """Draw the true values from the stated ones, normal and independent, by their uncertainties."""
     rng = np.random.default_rng(seed)
+    uncertainty = disturbances.load_uncertainty or 0.0
 
     def around(record: object, *names: str) -> Values:
         values = {}
@@ -57,13 +56,13 @@ def drawn(
     film["poisson_ratio"] = 0.5 - abs(0.5 - film["poisson_ratio"])
     rod = replace(stated.rod, **around(stated.rod, "radius"))
     sphere = replace(stated.sphere, **around(stated.sphere, "radius"))
-    rod_load, load = (1.0 + load_uncertainty * rng.standard_normal() for _ in range(2))
+    rod_load, load = (1.0 + uncertainty * rng.standard_normal() for _ in range(2))
     return Reality(
         film=replace(stated.film, **film, poisson_ratio_uncertainty=None),
         rod=rod,
         sphere=sphere,
         rod_load_scale=rod_load,
-        load_scale=rod_load if one_load_cell else load,
+        load_scale=rod_load if disturbances.one_load_cell else load,
     )
 
 
@@ -229,10 +228,7 @@ def simulate_experiment(
 
 def _true(stated: Reality, disturbances: Disturbances, seed: int) -> Reality:
     """Return the true film, indenters and loads: drawn if asked for, the film as thick as it is."""
-    true = stated
-    if disturbances.draw_inputs:
-        uncertainty = disturbances.load_uncertainty or 0.0
-        true = drawn(stated, uncertainty, seed, one_load_cell=disturbances.one_load_cell)
+    true = drawn(stated, disturbances, seed) if disturbances.draw_inputs else stated
     thickness = disturbances.thickness_factor * true.film.thickness
     return replace(true, film=replace(true.film, thickness=thickness))
 

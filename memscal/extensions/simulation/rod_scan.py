@@ -19,12 +19,7 @@ from memscal.extensions.simulation.sensor_array import simulated_array
 from memscal.friction.family import require_loads
 from memscal.mechanics.contact import Contact
 from memscal.mechanics.press_rod import press_rod
-from memscal.model.arrays import (
-    Arrays,
-    FloatArray,
-    require_non_negative,
-    require_range,
-)
+from memscal.model.arrays import Arrays, FloatArray, require_non_negative, require_range
 from memscal.model.film import LINEAR, NEO_HOOKEAN, ElasticFilm
 from memscal.model.indenter import Rod
 from memscal.model.scan import Scan
@@ -143,7 +138,7 @@ def simulate(
     if array:
         several = simulated_array(array, pitch, crosstalk, disturbances.centre, seed)
         raster = raster or array[0] > 1
-        reach = float(several.layout.max()) + _BEYOND * film.thickness
+        reach = several.layout.max() + _BEYOND * film.thickness
         count = 2 * math.ceil(reach / film.thickness * (4 if raster else 8)) + 1
     half_range = reach if half_range is None else half_range
     points = count if points is None else points

@@ -3,13 +3,7 @@
 import numpy as np
 
 from memscal.extensions.simulation.sensor import Truth
-from memscal.model.arrays import (
-    FloatArray,
-    Values,
-    array_record,
-    require_positive,
-    require_range,
-)
+from memscal.model.arrays import FloatArray, Values, array_record, require_positive, require_range
 
 #: Scatter of the conversion constants, and of the centres about the layout, in m.
 _SCATTER = 0.05
@@ -39,8 +33,7 @@ class SimulatedArray:
     @property
     def stated(self) -> Values:
         """What a scan states of them."""
-        layout = self.layout
-        return {"sensors": self.sensors, "layout": layout, "layout_uncertainty": MISPLACED}
+        return {"sensors": self.sensors, "layout": self.layout, "layout_uncertainty": MISPLACED}
 
     def read(self, stresses: FloatArray) -> FloatArray:
         """Return what sensors read of their stresses, (n, ...), over the nominal constant."""
@@ -70,7 +63,7 @@ def simulated_array(
     require_positive("pitch", pitch, "m")
     require_range("crosstalk", crosstalk, -0.5, 0.5)
     y, x = np.mgrid[:rows, :columns]
-    layout = pitch * np.stack([x.ravel(), y.ravel()], axis=1)
+    layout = pitch * np.column_stack([x.ravel(), y.ravel()])
     layout -= layout.mean(axis=0)
     rng = np.random.default_rng([seed, 2])
     apart = np.hypot(*(layout[:, None] - layout).T)

@@ -104,7 +104,8 @@ def test_the_scans_of_one_seed_share_no_noise():
 
 
 def test_what_is_drawn_scatters_as_it_is_stated():
-    draws = [drawn(NOMINAL, 0.01, seed) for seed in range(2000)]
+    stated = memscal.Disturbances(load_uncertainty=0.01)
+    draws = [drawn(NOMINAL, stated, seed) for seed in range(2000)]
     sampled = {}
     for place in UNCERTAIN:
         record, name = place.split(".")
