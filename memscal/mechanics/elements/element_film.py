@@ -262,8 +262,7 @@ class ElementFilm:
 
     film: ElasticFilm
     r: FloatArray
-    radius: float = 25e-3
-    refinement: int = 1  # how many times shorter than by default the sides of the triangles are
+    radius: float
 
     def __post_init__(self) -> None:
         if self.r[-1] > self.radius:
@@ -277,8 +276,7 @@ class ElementFilm:
     def system(self) -> MixedSystem:
         """The finite-element equations, in film thicknesses and shear moduli."""
         rings = self.r / self.film.thickness
-        radius = self.radius / self.film.thickness
-        mesh = film_triangles(rings, radius=radius, refinement=self.refinement)
+        mesh = film_triangles(rings, radius=self.radius / self.film.thickness)
         return MixedSystem(mesh, self.film.poisson_ratio)
 
     @cached_property
