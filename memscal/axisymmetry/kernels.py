@@ -1,8 +1,6 @@
 """Radial apparatus functions of unit integral whose transform has a closed form."""
 
-from __future__ import annotations
-
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -191,11 +189,6 @@ class Rings:
     radius: FloatArray
     blur: FloatArray
     amplitude: FloatArray
-
-    @classmethod
-    def joined(cls, parts: Sequence[Rings]) -> Rings:
-        """Return all rings of several sets."""
-        return cls(*np.hstack([[rings.radius, rings.blur, rings.amplitude] for rings in parts]))
 
     def transform(self, k: FloatArray) -> FloatArray:
         """Hankel transforms at ``k`` (rad/m), shape (k, m)."""

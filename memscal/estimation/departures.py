@@ -288,8 +288,7 @@ class DepartureBasis:
             parts = [gaussian[:, None], slope[:, None], none]
             if self.angular:
                 parts.append(self.angular.mean(side.rings, place))
-            if self.rings:
-                parts.append(side.rings(Rings.joined(self.rings), place))
+            parts += [side.rings(rings, place) for rings in self.rings]
             if self.families:
                 parts.append(self._families(gaussian[:, None], place, side))
             table = np.hstack(parts)

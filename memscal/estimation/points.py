@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from memscal.errors import FitError, InputError
 from memscal.estimation.decorrelation import Decorrelation
 from memscal.extensions import hook
-from memscal.model.arrays import BoolArray, FloatArray, IndexArray, array_record
+from memscal.model.arrays import BoolArray, FloatArray, IndexArray, Values, array_record
 from memscal.model.correlation import is_banded, of_points, root_of
 from memscal.model.instrument import Dynamics
 from memscal.model.notation import VOLTS, Reading
@@ -252,7 +252,7 @@ class ScanPoints:
 
     def selected(self, chosen: IndexArray) -> ScanPoints:
         """Return some of the points, without their correlations."""
-        columns: dict[str, Any] = {
+        columns: Values = {
             name: value[chosen]
             for name, value in vars(self).items()
             if isinstance(value, np.ndarray) and name not in ("free", "averaging", "curvature")
