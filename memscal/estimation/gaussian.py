@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from memscal.axisymmetry.hankel import quotient
 from memscal.axisymmetry.kernels import gaussian_transfer, gaussian_transfer_slope
 from memscal.errors import FitError, InputError
 from memscal.estimation.ellipse import elliptic_columns
@@ -149,7 +150,7 @@ def _robust_start_of_scan(model: ForwardModel, weights: FloatArray) -> ArrayTrip
     odd = factors
     if points.order:
         along = points.positions[model.axis] - centres[:, model.axis, None]
-        odd = factors * along / np.where(distances > 0, distances, 1.0)
+        odd = factors * quotient(along, distances)
     shapes = np.concatenate([np.interp(distances, radii, table) * odd for table in tables])
     amplitudes, costs = _amplitudes(shapes, data, drift)
     if points.order:
@@ -171,7 +172,7 @@ def _amplitudes(shapes: FloatArray, data: FloatArray, drift: FloatArray) -> Arra
     free = shapes - (shapes @ base) @ base.T
     rest = data - base @ (base.T @ data)
     square = np.sum(free**2, axis=1)
-    amplitudes = np.divide(free @ rest, square, out=np.zeros_like(square), where=square > 0)
+    amplitudes = quotient(free @ rest, square)
     return amplitudes, abs(rest - amplitudes[:, None] * free).sum(axis=1)
 
 
@@ -245,6 +246,11 @@ class GaussianFit:
         """L2 norm of the round Gaussian of that width, in V/Pa/m."""
         return float(self.conversion_constant / (2 * np.sqrt(np.pi) * self.width))
 
+    @property
+    def count(self) -> int:
+        """How many parameters it has."""
+        return len(self.jacobian.T)
+
     def shifts(self, columns: FloatArray) -> FloatArray:
         """Of columns (n, p) by the parameters, shifts of all scans along x and along y, (n, 2)."""
         return columns[:, self.points.centres] @ np.eye(2)[np.nonzero(self.points.free)[1]]
@@ -252,7 +258,7 @@ class GaussianFit:
     @property
     def prior(self) -> ArrayPair:
         """Further rows (c, p) of the jacobian by the curvatures' prior, and their residuals."""
-        rows = self.points.prior_rows[:, : self.jacobian.shape[1]]
+        rows = self.points.prior_rows[:, : self.count]
         return rows, -rows.sum(axis=1) * self.drift[self.drift.size - len(rows) :]
 
     def has_width(self, weights: FloatArray, noise: float) -> bool:

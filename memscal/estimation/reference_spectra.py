@@ -9,7 +9,13 @@ from itertools import product
 
 import numpy as np
 
-from memscal.axisymmetry.hankel import ACROSS, RadialSpectrum, Wavenumbers, hankel_transform
+from memscal.axisymmetry.hankel import (
+    ACROSS,
+    RadialSpectrum,
+    Wavenumbers,
+    hankel_transform,
+    quotient,
+)
 from memscal.errors import FitError, InputError
 from memscal.estimation.forward import ForwardModel
 from memscal.estimation.gaussian import MOST_AT_START, fit_gaussian_to_points, some_points
@@ -291,7 +297,7 @@ def difference(set_up: SetUp, reference: RadialSpectrum, more: SetUp, less: SetU
     rods = (more, less, set_up)
     upper, lower, own = (rod_spectrum(r, reference, law) * set_up.load / r.load for r in rods)
     # Zero where the scan's own ends.
-    return reference.values * np.divide(upper - lower, own, out=np.zeros_like(own), where=own != 0)
+    return reference.values * quotient(upper - lower, own)
 
 
 def law_at_once(set_up: SetUp) -> str:
