@@ -125,7 +125,7 @@ class PlaneDepartures:
     @property
     def count(self) -> int:
         """How many kernels there are."""
-        return int(self.amplitudes.shape[1])
+        return len(self.amplitudes.T)
 
     def mean(self, of: Callable[[Rings, FloatArray], FloatArray], place: FloatArray) -> FloatArray:
         """Means of the kernels over directions, or their transforms, at places (n,): (n, count)."""
