@@ -14,6 +14,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.linalg import orth
 from scipy.special import chdtrc, chdtri, fdtrc, fdtri, gammaincc, gammainccinv
 
 from memscal.estimation.points import grouped
@@ -86,7 +87,7 @@ def free_model(estimate: ProfileEstimate, *, clip_outliers: bool = False) -> Fre
     q, columns = orthonormalised(columns)
     # Angular departures are no parameters: what of them stands above the noise counts.
     _, flat, around, rings = np.split(
-        columns, [1, 1 + fit.jacobian.shape[1], columns.shape[1] - len(mixed)], axis=1
+        columns, [1, 1 + fit.count, columns.shape[1] - len(mixed)], axis=1
     )
     if basis.angular:
         around = basis.angular.combined(around)
@@ -323,5 +324,4 @@ def orthonormal(design: FloatArray, size: FloatArray | None = None) -> FloatArra
     scaled = design / np.where(size > 0, size, 1.0)
     if len(scaled) > DENSE:
         return orthonormalised(scaled, np.ones_like(size), _DEPENDENT)[0]
-    left, singular, _ = np.linalg.svd(scaled, full_matrices=False)
-    return left[:, singular > _DEPENDENT * singular[0]]
+    return orth(scaled, rcond=_DEPENDENT)
