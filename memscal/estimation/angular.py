@@ -82,7 +82,7 @@ class AngularDepartures:
     @property
     def count(self) -> int:
         """How many kernels there are."""
-        return int(self.amplitudes.shape[1])
+        return len(self.amplitudes.T)
 
     def mean(self, _: Callable[..., FloatArray], place: FloatArray) -> FloatArray:
         """Means of the kernels over directions, or their transforms, at places (n,): none."""
@@ -93,12 +93,12 @@ class AngularDepartures:
         from scipy.interpolate import CubicSpline
 
         rings = self.components
-        plane_x, plane_y = (each.ravel() for each in np.meshgrid(x, y))
-        total = np.zeros((plane_x.size, coefficients.shape[1]))
+        radius = np.hypot.outer(y, x).ravel()
+        total = np.zeros((radius.size, coefficients.shape[1]))
         step = rings.blur / _PER_BLUR
-        near = np.hypot(plane_x, plane_y) < rings.radius[-1] + _BLURS * rings.blur
-        r = np.hypot(plane_x[near], plane_y[near])
-        angle = np.arctan2(plane_y[near], plane_x[near])
+        near = radius < rings.radius[-1] + _BLURS * rings.blur
+        r = radius[near]
+        angle = np.arctan2.outer(y, x).ravel()[near]
         table = step * np.arange(np.ceil(r.max(initial=0.0) / step) + 4)
         for i, amplitudes in enumerate(self._by_rings(coefficients)):
             m = ORDERS[i // 2]
