@@ -488,7 +488,9 @@ def joined_points(scans: Sequence[ScanPoints], owners: Sequence[int] | None = No
             cure="Give scans of one sensor, or correct /entry/instrument/stress_sensor/dynamics.",
         )
     names = ("x", "y", "u", "load", "x_errors", "velocity", "branch", "anew", "repeat", *own)
-    columns = {name: np.concatenate([getattr(each, name) for each in scans]) for name in names}
+    columns: Values = {
+        name: np.concatenate([getattr(each, name) for each in scans]) for name in names
+    }
     columns["repeat"] += before[number]
     blocks = []
     first = 0
@@ -496,17 +498,14 @@ def joined_points(scans: Sequence[ScanPoints], owners: Sequence[int] | None = No
         if points.decorrelation:
             blocks += [(rows + first, root) for rows, root in points.decorrelation.blocks]
         first += points.u.size
-    return ScanPoints(
+    return replace(
+        scans[0],
         **columns,
         u_errors=np.concatenate(stated) if stated else None,
         owner=number if owners is None else np.array(owners)[number],
         scan=number,
         missing=sum(points.missing for points in scans),
         decorrelation=Decorrelation(tuple(blocks)) if blocks else None,
-        channel=scans[0].channel,
-        reading=scans[0].reading,
-        unit=scans[0].unit,
-        dynamics=scans[0].dynamics,
     )
 
 
