@@ -307,11 +307,10 @@ def _revise(
         borne = law.separation(np.where(closing, p, 1.0), problem.film)
         separation = np.where(closing, np.clip(borne, separation, before), parting)
         pressing = _bearing(problem, law, separation)
-    stretch = status.stretch
     if not problem.interface.rigid:
         settled &= abs(p - status.pressure).max() <= _SETTLED * p.max()
-        length = problem.interface.slip_length
-        stretch = np.clip(trial.outward - status.anchor, -length, length)
+    length = problem.interface.slip_length
+    stretch = np.clip(trial.outward - status.anchor, -length, length)
     return _Status(pressing, slip, status.anchor, separation, p, stretch), settled
 
 
