@@ -234,7 +234,7 @@ def field_mesh(system: MixedSystem, solution: FloatArray, film: ElasticFilm) -> 
 
     radial = averaged(gradient[0][0])
     vertical = averaged(gradient[1][1])
-    hoop = np.where(r > 0, displacement[:, 0] / np.where(r > 0, r, 1.0), radial)
+    hoop = np.divide(displacement[:, 0], r, out=radial.copy(), where=r > 0)
     slip = averaged(gradient[0][1] + gradient[1][0])
     mean = averaged(squeeze)
     volume = (radial + vertical + hoop) / 3

@@ -169,6 +169,4 @@ class _Front:
             self.triangles.extend(triangle for triangle in corners if len(set(triangle)) == 3)
 
     def _length(self, start: int, end: int) -> float:
-        r1, d1 = self.points[start]
-        r2, d2 = self.points[end]
-        return float(np.hypot(r1 - r2, d1 - d2))
+        return float(np.hypot(*np.subtract(self.points[start], self.points[end])))
