@@ -303,8 +303,8 @@ def weigh_departures(
     reduced: ReducedScan,
     basis: DepartureBasis,
     effective_count: float,
-    expected_noise: float = 0.0,
     least_noise: float = 0.0,
+    expected_noise: float = 0.0,
 ) -> Weighing:
     """Weigh the hypotheses about departures from a fit."""
     # ``effective_count``: readings in the data, of which a point may be a mean, by their weight.

@@ -361,20 +361,19 @@ def _weighed(
     rings = AngularRings.about(fit) if angular else None
     reduced = ReducedScan.of(model, fit, weights, rings)
     basis = departure_basis(fit, reduced)
-    noises = {"effective_count": count, "least_noise": noise}
     if not rings:
-        return basis, bayesian.weigh_departures(reduced, basis, **noises).average()
+        return basis, bayesian.weigh_departures(reduced, basis, count, noise).average()
     radial = reduced.signal(basis.kernels(model.k)[:, fit.count :])
     columns = (reduced.data, reduced.flat, radial, reduced.components)
     basis = departure_basis(fit, reduced, angular_departures(rings, fit, columns, noise))
-    about_centre = bayesian.weigh_departures(reduced, basis, **noises)
+    about_centre = bayesian.weigh_departures(reduced, basis, count, noise)
     if fit.points.u.size > MOST_READINGS:
         return basis, about_centre.average()
     spots = Spots.about(fit, model, weights, noise)
     reduced = ReducedScan.of(model, fit, weights, spots)
     free = plane_departures(spots, fit, (reduced.data, reduced.flat, reduced.components), noise)
     free_basis = departure_basis(fit, reduced, free)
-    free_weighing = bayesian.weigh_departures(reduced, free_basis, **noises)
+    free_weighing = bayesian.weigh_departures(reduced, free_basis, count, noise)
     if free_weighing.evidence >= about_centre.evidence + _CLEARLY:
         weighed = free_weighing.average()
         # Noise that grows with the signal, as by errors of the stage, would be taken for G.

@@ -7,14 +7,12 @@ and every combination of departures that stands above a share of the noise.  Wha
 :math:`(1 - QQ^T)z`, does not depend on G.
 """
 
-from __future__ import annotations
-
 import math
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.linalg import orth
+from scipy.sparse import csr_array, diags_array
 from scipy.special import chdtrc, chdtri, fdtrc, fdtri, gammaincc, gammainccinv
 
 from memscal.estimation.points import grouped
@@ -22,9 +20,6 @@ from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.voltage_map import DENSE, orthonormalised, triangular
 from memscal.model.arrays import TINY, FloatArray, IndexArray, array_record, slices, value_record
 from memscal.model.checks import FALSE_ALARM, OUTLIER_WEIGHT
-
-if TYPE_CHECKING:
-    from scipy.sparse import csr_array
 
 #: A departure of the expected size that moves no voltage by this share of its noise is left out.
 _SHARE_OF_NOISE = 0.1
@@ -259,8 +254,6 @@ def neighbour_correlation_test(residuals: Residuals) -> TestOutcome:
     # 1950, with more lags).  Normal noise of nu degrees gives it the mean S1/nu and the central
     # moments 2 S2 / nu(nu+2) and 8 S3 / nu(nu+2)(nu+4), where S1 = tr (1 - QQ')W and
     # Sp = tr [(1 - QQ')(W - S1/nu)]^p; the p-value is that of a gamma distribution (Pearson III).
-    from scipy.sparse import diags_array
-
     nu = residuals.degrees
     values = residuals.values
     place = residuals.place
