@@ -295,16 +295,15 @@ class ScanPoints:
         every = np.arange(place.size)
         known = self.decorrelation
         root = own[:, None] * known.correlate(np.eye(every.size)) if known else own[None]
-        points = replace(self, decorrelation=Decorrelation(((every, root),)))
-        columns = csr_array((share, (every, place)))
+        factor = Decorrelation(((every, root),))
         if known:
-            assert points.decorrelation
-            return points.sharing(points.decorrelation.apply(columns.toarray()))[0]
+            columns = factor.apply(csr_array((share, (every, place))).toarray())
+            return replace(self, decorrelation=factor).sharing(columns)[0]
         # No reading has two positions: the columns are orthogonal.
         square = np.bincount(place, (share / own) ** 2)
         size = np.sqrt(np.where(square > 0, square, 1.0))
         common = csr_array((share / own / size[place], (every, place)))
-        factor = Decorrelation(((every, root),), ((common, np.sqrt(1 + square)),))
+        factor = replace(factor, common=((common, np.sqrt(1 + square)),))
         return replace(self, decorrelation=factor)
 
     def unstandardise(self, columns: FloatArray, weights: FloatArray) -> FloatArray:
