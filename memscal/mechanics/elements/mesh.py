@@ -15,15 +15,14 @@ import numpy as np
 
 from memscal.model.arrays import ArrayFunction, BoolArray, FloatArray, IndexArray, array_record
 
-# Intervals between rings that one side of a triangle spans.  A quartic has four, but with two the
+# One side of a triangle spans two intervals between rings.  A quartic has four, but with two the
 # shear of a sticking contact needs a quarter of the rings, for 1.4 times the time.
-_INTERVALS = 2
-# ... and one only at the last rings, so many of them, where a rod's pressure is singular, ...
+# It spans one at the last rings, so many of them, where a rod's pressure is singular, ...
 _AT_THE_EDGE = 4
 # ... and at an edge within the rings, where they are closer than this share of the outermost gap:
 # the shear of a contact that sticks at once is singular there.
 _NARROW = 0.25
-# ... where the widest of them is at most so many times the narrowest.
+# Two are joined where the wider one is at most so many times the narrower one.
 _UNEVEN = 2.1
 # Widest side at distances from the contact, all in film thicknesses: the field decays ...
 _DISTANCES = (1.0, 5.0, 9.0)
@@ -87,14 +86,12 @@ def _fitted(rings: FloatArray) -> FloatArray:
     last = gaps.size
     while last > 0:
         single = gaps.size - last < _AT_THE_EDGE or gaps[last - 1] < _NARROW * gaps[-1]
-        span = 1 if single else _INTERVALS
         first = last - 1
         longest = _widest(rings[-1], rings[last])
-        while first > 0 and last - first < span:
+        if first > 0 and not single:
             group = gaps[first - 1 : last]
-            if group.sum() > longest or group.max() > _UNEVEN * group.min():
-                break
-            first -= 1
+            if group.sum() <= longest and group.max() <= _UNEVEN * group.min():
+                first -= 1
         pieces = int(np.ceil(gaps[first:last].sum() / longest))
         corners.extend(np.linspace(rings[last], rings[first], pieces + 1)[1:])
         last = first

@@ -85,7 +85,7 @@ def test_finer_triangles_agree_better_with_hankel_transforms(monkeypatch):
     normal = expected.base(r, 0)
     down = expected.surface(r, 0)
     found = [model.field(*traction)]
-    monkeypatch.setattr(mesh, "_INTERVALS", 1)
+    monkeypatch.setattr(mesh, "_UNEVEN", 0.0)
     for name in ("_WIDEST", "_WIDENING", "_GROWTH", "_SLOPE", "_TALLEST"):
         monkeypatch.setattr(mesh, name, np.multiply(getattr(mesh, name), 0.5))
     found.append(replace(model).field(*traction))
