@@ -385,18 +385,18 @@ def linearise(model: ForwardModel, theta: FloatArray) -> GaussianFit:
     ellipticity = np.zeros(2)
     ellipticity[: points.ellipse] = theta[ellipse:]
     geometry = model.geometry(centre)
-    kernel = gaussian_transfer(model.k, sigma)
     if points.ellipse:
         columns, shift = elliptic_columns(model, geometry, sigma, ellipticity)
-        shift = amplitude * shift
     else:
-        shift = model.shift_derivative(geometry, amplitude * kernel)
+        kernel = gaussian_transfer(model.k, sigma)
+        shift = model.shift_derivative(geometry, kernel)
         both = np.column_stack([kernel, gaussian_transfer_slope(model.k, sigma)])
         columns = model.signal(geometry, both)
-    signal = columns[:, :1]
     by_shape = amplitude * columns[:, 1 : 2 + points.ellipse]
-    centring = model.by_free_centres(shift)
-    jacobian = np.hstack([signal, by_shape[:, :1], centring, model.drift_columns, by_shape[:, 1:]])
+    centring = model.by_free_centres(amplitude * shift)
+    jacobian = np.hstack(
+        [columns[:, :1], by_shape[:, :1], centring, model.drift_columns, by_shape[:, 1:]]
+    )
     predicted = amplitude * columns[:, 0] + model.drift_columns @ drift
     return GaussianFit(
         theta, amplitude, sigma, centre, drift, ellipticity, points, geometry, jacobian, predicted

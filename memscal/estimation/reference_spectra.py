@@ -295,7 +295,7 @@ def difference(set_up: SetUp, reference: RadialSpectrum, more: SetUp, less: SetU
     """Difference of two rods per newton, scaled from the scan's own rod to the reference."""
     law = law_at_once(set_up)
     rods = (more, less, set_up)
-    upper, lower, own = (rod_spectrum(r, reference, law) * set_up.load / r.load for r in rods)
+    upper, lower, own = (rod_spectrum(r, reference, law) / r.load for r in rods)
     # Zero where the scan's own ends.
     return reference.values * quotient(upper - lower, own)
 
