@@ -44,7 +44,8 @@ def fit_gaussian(g: Field, start: float | None = None) -> float:
     root = np.sqrt(r)
     narrowest = 0.5 * float(r[1] - r[0])
     if start is None:
-        start = max(float(1 / np.sqrt(4 * np.pi * g.grid.integrate(g.values**2))), 2 * narrowest)
+        start = float(1 / np.sqrt(4 * np.pi * g.grid.integrate(g.values**2)))
+    start = max(start, 2 * narrowest)
 
     def linearise(scaled: FloatArray) -> ArrayPair:
         """Misfit at a width over ``start``, and its slope."""
@@ -54,7 +55,7 @@ def fit_gaussian(g: Field, start: float | None = None) -> float:
         slope = root * unit_gaussian_slope(r, sigma) * start**3
         return misfit, slope[:, None]
 
-    begin = np.array([max(start, 2 * narrowest) / start])
+    begin = np.ones(1)
     width = gauss_newton(linearise, begin, tolerance=1e-10)
     if width is not None and width[0] * start > 2 * narrowest:
         return float(width[0] * start)

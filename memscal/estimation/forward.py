@@ -167,8 +167,8 @@ class Geometry:
         """How many first nodes factors need: all, a half, a quarter and so on."""
         # A source with an edge has many waves, of which a wide kernel passes few.
         size = abs(spread)
-        used = np.flatnonzero(size > _NO_SHARE * size.max(initial=0.0))
-        needed = 1 + (used[-1] // (spread.size // len(spread)) if used.size else 0)
+        used = np.nonzero(size > _NO_SHARE * size.max(initial=0.0))[0]
+        needed = 1 + used.max(initial=0)
         halvings = int(np.log2(self.k.size / needed))
         return int(np.ceil(self.k.size / 2**halvings))
 
@@ -289,8 +289,14 @@ class ForwardModel:
             return np.hstack(first), None
         strongest = np.abs(self._measures).max(axis=0)
         reach = _REACHES * geometry.radius.max() / geometry.reach
-        table = (points.order, geometry.across, geometry.reach, self.k.tobytes())
-        size, right, splines = _seen_waves(*table, math.ceil(reach), strongest.tobytes())
+        size, right, splines = _seen_waves(
+            points.order,
+            geometry.across,
+            geometry.reach,
+            self.k.tobytes(),
+            math.ceil(reach),
+            strongest.tobytes(),
+        )
         interpolation = geometry.interpolation(self.k.size)
         factor = points.load
         if points.order:
