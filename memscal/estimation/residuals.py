@@ -141,10 +141,9 @@ def residuals_of(estimate: ProfileEstimate, model: FreeModel | None = None) -> R
     """Project a scan off all voltages that an apparatus function can make."""
     model = model or free_model(estimate)
     points = estimate.points
-    runs_along_x = points.free[points.scan, 0]
-    along = np.where(runs_along_x, points.x, points.y)
-    across = np.where(runs_along_x, points.place_numbers("row"), 0)
-    order = np.lexsort((along, across, points.repeat, points.scan))
+    # A line along y has a row for each place.
+    across = points.free[points.scan, 0] * points.place_numbers("row")
+    order = np.lexsort((points.along(points.positions), across, points.repeat, points.scan))
     place = np.argsort(order)
     sequence = grouped(across, points.repeat, points.scan)
     order = np.argsort(place[model.point])
