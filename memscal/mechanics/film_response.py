@@ -169,7 +169,7 @@ class RingTraction:
     """Pressure and outward shear (Pa) linear between rings (m, from 0), zero beyond the last."""
 
     rings: FloatArray
-    pressures: FloatArray
+    pressures: FloatArray  # (n,), or (n, m) of several tractions
     shears: FloatArray
 
     @property
@@ -203,12 +203,13 @@ class RingTraction:
 
     def _transform(self, values: FloatArray, k: FloatArray, order: int) -> FloatArray:
         flat = np.ravel(floats(k))
-        transform = np.zeros_like(flat)
+        several = values.shape[1:]
+        transform = np.zeros((flat.size, *several))
         if np.any(values):
             for chunk in slices(flat.size, _CHUNK):
                 hats = hat_transform(self.rings.tobytes(), flat[chunk].tobytes(), order)
                 transform[chunk] = hats @ values
-        return transform.reshape(np.shape(k))
+        return transform.reshape(np.shape(k) + several)
 
 
 #: Wavenumbers that are treated together: bounds the memory.
@@ -242,14 +243,9 @@ class HankelFilm:
     @cached_property
     def compliance(self) -> SurfaceCompliance:
         """Displacements of the rings under tractions on the rings."""
-        r = self.r
-        direct = singular_integrals(r, r)
-        across = coupling_integrals(r, r)
-        k, weights = _wavenumbers(self.film, 2 * r[-1])
-        normal, radial = (hat_transform(r.tobytes(), k.tobytes(), order) for order in (0, 1))
-        half_space = (direct[0], *across, direct[1])
-        moved = _displacements(self.film, r, k, weights, normal, radial, half_space)
-        return SurfaceCompliance(r, np.block([[*moved[:2]], [*moved[2:]]]))
+        unit = np.eye(self.r.size)
+        moved = self.field(unit, unit).displacements(self.r)
+        return SurfaceCompliance(self.r, np.block([[*moved[:2]], [*moved[2:]]]))
 
     discretisation = "Hankel transforms, Gauss-Legendre in k"
 
@@ -295,14 +291,28 @@ class HankelField:
 
     def surface(self, r: FloatArray, order: int) -> FloatArray:
         """Return depression or outward displacement of the surface in m."""
-        x = np.ravel(r)
+        by_pressure, by_shear = self.displacements(np.ravel(r))[2 * order : 2 * order + 2]
+        return (by_pressure + by_shear).reshape(np.shape(r))
+
+    def displacements(self, x: FloatArray) -> HalfSpaceIntegrals:
+        """Return depression by pressure and by shear, then outward displacement, at ``x`` (m)."""
+        film = self.film
         traction = self.traction
-        k, weights = _wavenumbers(self.film, x.max(initial=0.0) + traction.radius)
+        nu = film.poisson_ratio
+        scale = (1 - nu) / film.shear_modulus
+        beta = half_space_coupling(nu)
+        k, weights = _wavenumbers(film, x.max(initial=0.0) + traction.radius)
         p = traction.pressure_transform(k)
         q = traction.shear_transform(k)
-        displaced = _displacements(self.film, x, k, weights, p, q, traction.half_space_integrals(x))
-        by_pressure, by_shear = displaced[2 * order : 2 * order + 2]
-        return (by_pressure + by_shear).reshape(np.shape(r))
+        half_space = traction.half_space_integrals(x)
+        by_normal, coupling, by_radial = corrections(k * film.thickness, nu)
+        normal, radial = (bessel(order, np.outer(x, k)) * weights for order in (0, 1))
+        return (
+            scale * (half_space[0] + (normal * by_normal) @ p),
+            scale * (beta * half_space[1] + (normal * coupling) @ q),
+            scale * (beta * half_space[2] + (radial * coupling) @ p),
+            scale * (half_space[3] + (radial * by_radial) @ q),
+        )
 
 
 def _wavenumbers(film: ElasticFilm, reach: float) -> ArrayPair:
@@ -310,26 +320,3 @@ def _wavenumbers(film: ElasticFilm, reach: float) -> ArrayPair:
     # 1.5/h keeps the panels short beside the distance of the transfer functions' poles.
     h = film.thickness
     return gauss_panels(_LARGEST_KH / h, min(1.5 / h, _PHASE / max(reach, h)))
-
-
-def _displacements(
-    film: ElasticFilm,
-    x: FloatArray,
-    k: FloatArray,
-    weights: FloatArray,
-    p: FloatArray,  # transforms of pressure and shear, at the wavenumbers
-    q: FloatArray,
-    half_space: HalfSpaceIntegrals,
-) -> HalfSpaceIntegrals:
-    """Return the depression at ``x`` by p and by q, and the outward displacement by p and by q."""
-    nu = film.poisson_ratio
-    scale = (1 - nu) / film.shear_modulus
-    beta = half_space_coupling(nu)
-    by_normal, coupling, by_radial = corrections(k * film.thickness, nu)
-    normal, radial = (bessel(order, np.outer(x, k)) * weights for order in (0, 1))
-    return (
-        scale * (half_space[0] + (normal * by_normal) @ p),
-        scale * (beta * half_space[1] + (normal * coupling) @ q),
-        scale * (beta * half_space[2] + (radial * coupling) @ p),
-        scale * (half_space[3] + (radial * by_radial) @ q),
-    )
