@@ -186,8 +186,8 @@ class MixedSystem:
         return splu(csc_array(self.matrix[self.free][:, self.free]))
 
     def solve(self, unknowns: IndexArray, loads: FloatArray) -> FloatArray:
-        """Return all unknowns, shape (all, n), under loads, shape (unknowns.size, n), on some."""
-        right = np.zeros((self.matrix.shape[0], loads.shape[1]))
+        """Return all unknowns, (all,) or (all, n), under loads, (m,) or (m, n), on m of them."""
+        right = np.zeros((self.matrix.shape[0], *loads.shape[1:]))
         right[unknowns] = loads
         right[self.free] = self._factors.solve(right[self.free])
         right[self._held] = 0.0
@@ -282,24 +282,14 @@ class ElementFilm:
     @cached_property
     def compliance(self) -> SurfaceCompliance:
         """Displacements of the rings under tractions on the rings."""
-        system = self.system
-        rings = self.r / self.film.thickness
-        line, outward, inward = system.side(0.0)
-        hats = line.loads_of_hats(rings).tocsc()
-        seen = line.at(rings)
-        scale = self.film.thickness / self.film.shear_modulus
-        # Direction and ring that moves by direction and ring of the traction.
-        moved = np.empty((2, rings.size, 2, rings.size))
-        task = Task("tractions", 2 * rings.size)
-        done = 0
-        for source, unknowns in enumerate((inward, outward)):
-            for batch in slices(rings.size, _BATCH):
-                solution = system.solve(unknowns, hats[:, batch].toarray())
-                moved[0, :, source, batch] = scale * (seen @ solution[inward])
-                moved[1, :, source, batch] = scale * (seen @ solution[outward])
-                done += rings[batch].size
-                task.tell(done)
-        return SurfaceCompliance(self.r, np.reshape(moved, (2 * rings.size, -1)))
+        unit = np.eye(2 * self.r.size)
+        moved = np.empty_like(unit)
+        task = Task("tractions", len(unit))
+        for batch in slices(len(unit), _BATCH):
+            field = self.field(*np.split(unit[:, batch], 2))
+            moved[:, batch] = np.vstack([field.surface(self.r, order) for order in (0, 1)])
+            task.tell(batch.stop)
+        return SurfaceCompliance(self.r, moved)
 
     @property
     def discretisation(self) -> str:
@@ -311,13 +301,13 @@ class ElementFilm:
         )
 
     def field(self, pressure: FloatArray, shear: FloatArray) -> ElementField:
-        """Return the field under ``pressure`` and ``shear`` (Pa) at the rings, shapes (n,)."""
+        """Return the field under ``pressure`` and ``shear`` (Pa) at the rings, (n,) or (n, m)."""
         line, outward, inward = self.system.side(0.0)
         hats = line.loads_of_hats(self.r / self.film.thickness)
         modulus = self.film.shear_modulus
-        loads = np.append(hats @ (pressure / modulus), hats @ (shear / modulus))
-        solution = self.system.solve(np.append(inward, outward), loads[:, None])
-        return ElementField(self.film, self.radius, self.system, solution[:, 0])
+        loads = np.concatenate([hats @ (pressure / modulus), hats @ (shear / modulus)])
+        solution = self.system.solve(np.append(inward, outward), loads)
+        return ElementField(self.film, self.radius, self.system, solution)
 
 
 @array_record
@@ -368,4 +358,4 @@ class ElementField:
             )
         line, outward, inward = self.system.side(0.0)
         values = line.at(flat / self.film.thickness) @ self.solution[outward if order else inward]
-        return (self.film.thickness * values).reshape(np.shape(r))
+        return self.film.thickness * values.reshape(np.shape(r) + values.shape[1:])
