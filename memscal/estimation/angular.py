@@ -126,7 +126,7 @@ def angular_departures(
     """Choose the kernels about a Gaussian fit; ``noise`` is that of a point of weight one."""
     # ``columns``, standardised: data (n,), of the fit's parameters, of all radial departures and
     # of the rings, (n, p).
-    from scipy.linalg import block_diag
+    from scipy.linalg import block_diag, null_space
 
     data, flat, radial, by_rings = (values / noise for values in columns)
     units = _unit_amplitudes(rings, fit.width)
@@ -138,7 +138,7 @@ def angular_departures(
         if i < len(parameters):
             # All combinations that the scan can tell from that parameter.
             alike = parameters[i] @ (block @ kernels)
-            kernels = kernels @ np.linalg.svd(alike[None])[2][1:].T
+            kernels = kernels @ null_space(alike[None])
         blocks.append(kernels)
     order = np.repeat(np.arange(len(blocks)) // 2, [kernels.shape[1] for kernels in blocks])
     amplitudes = block_diag(*blocks)

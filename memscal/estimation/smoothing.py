@@ -24,6 +24,7 @@ from dataclasses import replace
 from functools import cached_property, lru_cache
 
 import numpy as np
+from scipy.linalg import solve_triangular
 from scipy.sparse import block_diag, csr_array, eye_array, vstack
 from scipy.special import j0, j1
 
@@ -155,8 +156,6 @@ def _smoothed(
     """Smooth y (n,) by the restricted likelihood: coefficients of the free splines by y."""
     # ``splines`` (n, b) at the points, which lie in an ``interval`` each; ``free`` (b, m) of them,
     # and the triangular root (m, m) of their penalty.
-    from scipy.linalg import solve_triangular
-
     root = np.sqrt(weight)
     weighted = splines.multiply(root[:, None]).tocsr()
     # Between two knots few splines differ from zero: each interval has few rows in R.
