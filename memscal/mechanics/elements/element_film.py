@@ -206,50 +206,6 @@ _QUARTERS = np.array(
 )
 
 
-def field_mesh(system: MixedSystem, solution: FloatArray, film: ElasticFilm) -> FieldMesh:
-    """Return displacement and stress at all nodes; the strain is the mean over triangles there."""
-    import skfem
-
-    # Outward and inward unknowns of the 15 nodes of each triangle, in the element's own order.
-    dofs = system.displacement.element_dofs
-    local = skfem.ElementTriP4.doflocs
-    outward = dofs[0::2]
-    inward = dofs[1::2]
-    nodes, index = np.unique(inward, return_inverse=True)
-    index = index.reshape(inward.shape)
-    # The displacement's gradient and the mean pressure at the nodes of every triangle.
-    basis = system.displacement
-    rule = (local.T, np.ones(len(local)))
-    at_nodes = skfem.Basis(basis.mesh, basis.elem, quadrature=rule)
-    moved, pressed = np.split(solution, [basis.N])
-    gradient = at_nodes.interpolate(moved).grad
-    squeeze = np.asarray(at_nodes.with_element(skfem.ElementTriP3()).interpolate(pressed))
-    r, depth = system.displacement.doflocs[:, nodes]
-    displacement = np.empty((nodes.size, 2))
-    displacement[index, 0] = solution[outward]
-    displacement[index, 1] = -solution[inward]
-
-    def averaged(values: FloatArray) -> FloatArray:
-        return np.bincount(index.ravel(), values.T.ravel()) / np.bincount(index.ravel())
-
-    radial = averaged(gradient[0][0])
-    vertical = averaged(gradient[1][1])
-    hoop = np.divide(displacement[:, 0], r, out=radial.copy(), where=r > 0)
-    slip = averaged(gradient[0][1] + gradient[1][0])
-    mean = averaged(squeeze)
-    volume = (radial + vertical + hoop) / 3
-    stress = [2 * (strain - volume) - mean for strain in (radial, vertical, hoop)]
-    points = film.thickness * np.column_stack([r, 1 - depth])
-    return FieldMesh(
-        points=points,
-        triangles=anticlockwise(points, np.concatenate(np.moveaxis(index[_QUARTERS], 2, 1))),
-        displacement=film.thickness * displacement,
-        stress=film.shear_modulus * np.column_stack([*stress, -slip]),
-        notes=f"Linear elastic film, E = {film.young_modulus:g} Pa, nu = {film.poisson_ratio:g}, "
-        f"thickness {film.thickness * 1e3:g} mm, bonded at z = 0. Stress positive in tension.",
-    )
-
-
 # Tractions solved together: bounds the memory.
 _BATCH = 128
 # Radii between two nodes of the base at which its stress is tabulated for its spectrum.
@@ -320,8 +276,49 @@ class ElementField:
     solution: FloatArray  # displacements in film thicknesses, mean pressures in shear moduli
 
     def mesh(self) -> FieldMesh:
-        """Return displacement and stress inside the film, on quadratic triangles."""
-        return field_mesh(self.system, self.solution, self.film)
+        """Return displacement and stress at all nodes, the strain as the mean over triangles."""
+        import skfem
+
+        film = self.film
+        basis = self.system.displacement
+        # Outward and inward unknowns of the 15 nodes of each triangle, in the element's own order.
+        dofs = basis.element_dofs
+        local = skfem.ElementTriP4.doflocs
+        outward = dofs[0::2]
+        inward = dofs[1::2]
+        nodes, index = np.unique(inward, return_inverse=True)
+        index = index.reshape(inward.shape)
+        # The displacement's gradient and the mean pressure at the nodes of every triangle.
+        rule = (local.T, np.ones(len(local)))
+        at_nodes = skfem.Basis(basis.mesh, basis.elem, quadrature=rule)
+        moved, pressed = np.split(self.solution, [basis.N])
+        gradient = at_nodes.interpolate(moved).grad
+        squeeze = np.asarray(at_nodes.with_element(skfem.ElementTriP3()).interpolate(pressed))
+        r, depth = basis.doflocs[:, nodes]
+        displacement = np.empty((nodes.size, 2))
+        displacement[index, 0] = self.solution[outward]
+        displacement[index, 1] = -self.solution[inward]
+
+        def averaged(values: FloatArray) -> FloatArray:
+            return np.bincount(index.ravel(), values.T.ravel()) / np.bincount(index.ravel())
+
+        radial = averaged(gradient[0][0])
+        vertical = averaged(gradient[1][1])
+        hoop = np.divide(displacement[:, 0], r, out=radial.copy(), where=r > 0)
+        slip = averaged(gradient[0][1] + gradient[1][0])
+        mean = averaged(squeeze)
+        volume = (radial + vertical + hoop) / 3
+        stress = [2 * (strain - volume) - mean for strain in (radial, vertical, hoop)]
+        points = film.thickness * np.column_stack([r, 1 - depth])
+        return FieldMesh(
+            points=points,
+            triangles=anticlockwise(points, np.concatenate(np.moveaxis(index[_QUARTERS], 2, 1))),
+            displacement=film.thickness * displacement,
+            stress=film.shear_modulus * np.column_stack([*stress, -slip]),
+            notes=f"Linear elastic film, E = {film.young_modulus:g} Pa, "
+            f"nu = {film.poisson_ratio:g}, thickness {film.thickness * 1e3:g} mm, "
+            "bonded at z = 0. Stress positive in tension.",
+        )
 
     def spectrum(self, k: FloatArray, order: int) -> FloatArray:
         """Return the transform of normal stress or traction at ``k`` (rad/m), in N."""
