@@ -100,16 +100,13 @@ def _half_width(r: FloatArray, g: FloatArray) -> Functional:
     # With G(q) = G(m)/2, a change of G moves q by -(dG(q) - dG(m)/2) / G'(q).
     fine = np.linspace(r[0], r[-1], _FINE * r.size)
     values = radial_spline(r, g)(fine)
-    top = int(np.argmax(values))
-    last = min(int(np.flatnonzero(values >= values[top] / 2)[-1]), fine.size - 2)
+    top = np.argmax(values)
+    last = min(np.flatnonzero(values >= values[top] / 2)[-1], fine.size - 2)
     slope = (values[last + 1] - values[last]) / (fine[1] - fine[0])
     half = fine[last] + (values[top] / 2 - values[last]) / slope if slope else fine[last]
     row = np.zeros_like(r)
     if slope:
-        # A profile is read at a radius by linear interpolation.
+        # A profile is read at a radius by linear interpolation, between even radii.
         for place, factor in ((half, -2 / slope), (fine[top], 1 / slope)):
-            i = int(np.clip(np.searchsorted(r, place) - 1, 0, r.size - 2))
-            share = (place - r[i]) / (r[i + 1] - r[i])
-            row[i] += factor * (1 - share)
-            row[i + 1] += factor * share
+            row += factor * np.maximum(1 - abs(place - r) / (r[1] - r[0]), 0.0)
     return Functional("fwhm", float(2 * half), row)
