@@ -27,8 +27,8 @@ base.  With :math:`\kappa = 3 - 4\nu`, :math:`c = \cosh x`, :math:`s = \sinh x`,
 
 which tend to those of the half-space, :math:`W = Y = 1` and :math:`X = -(1-2\nu)/2(1-\nu)`, for
 large :math:`x`; a ``correction`` is the difference, free of cancellation.  They are evaluated with
-decaying exponentials, so that nothing overflows, and by a series where the closed form would
-cancel.  All take ``x`` of any shape, from 0 to infinity, and Poisson's ratio from 0 to 0.5.
+decaying exponentials, so that nothing overflows, and by a Bessel function where the closed form
+would cancel.  All take ``x`` of any shape, from 0 to infinity, and Poisson's ratio from 0 to 0.5.
 (For :math:`W` and :math:`T` see also Frétigny and Chateauminois, J. Phys. D 40 (2007) 5418.)
 
 In space the half-space's share of the surface's compliance is in closed form
@@ -45,6 +45,7 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.special import ive
 
 from memscal.axisymmetry.hankel import bessel, gauss_between, gauss_panels
 from memscal.mechanics.surface import (
@@ -58,9 +59,6 @@ from memscal.model.film import ElasticFilm
 
 # exp(-2 * 340) is still a normal number; beyond, every response has long reached its limit.
 _LARGEST_X = 340.0
-# Below this x a difference is summed as a series, exact to rounding with these terms.
-_SERIES_BELOW = 0.5
-_TERMS = 9
 
 
 def half_space_coupling(nu: float) -> float:
@@ -91,7 +89,9 @@ def base_response(x: ArrayLike, nu: float, order: int = 0) -> ArrayPair:
     rising = 2 * (1 - nu) * (1 + decay)
     falling = np.expm1(-2 * x)
     if order:
-        by_pressure = (1 - 2 * nu) * _x_cosh_minus_sinh(x, decay) + 2 * nu * x * (1 + decay)
+        # 2 exp(-x) (x cosh x - sinh x), free of cancellation: a spherical Bessel function.
+        difference = np.sqrt(2 * np.pi) * x**1.5 * ive(1.5, x)
+        by_pressure = (1 - 2 * nu) * difference + 2 * nu * x * (1 + decay)
         by_shear = rising + x * falling
     else:
         by_pressure = rising - x * falling
@@ -105,15 +105,6 @@ def _prepare(x: ArrayLike, nu: float) -> tuple[FloatArray, FloatArray, FloatArra
     kappa = 3 - 4 * nu
     decay = np.exp(-2 * x)
     return x, decay, kappa * (1 + decay**2) + decay * (4 * x**2 + kappa**2 + 1), kappa
-
-
-def _x_cosh_minus_sinh(x: FloatArray, decay: FloatArray) -> FloatArray:
-    """Return 2 exp(-x) (x cosh x - sinh x); below some x by its power series."""
-    series = np.ones_like(x)
-    for j in range(_TERMS - 1, 0, -1):
-        series = 1 + x**2 / (2 * j * (2 * j + 3)) * series
-    series *= 2 / 3 * np.exp(-x) * x**3
-    return np.where(x < _SERIES_BELOW, series, x * (1 + decay) + np.expm1(-2 * x))
 
 
 # Depression by pressure and by shear, outward displacement by pressure and by shear.
