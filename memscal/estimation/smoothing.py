@@ -239,8 +239,9 @@ def _layout(
     peak, end = reference.at(np.array([0.0, reach]))
     slope = -(measure * k * per_newton) @ j1(k * reach)
     # At R a spline has the logarithmic slope of the tail, which goes on from there.
-    ending = basis(np.array([reach]), 0).toarray()
-    tied = step * (end * basis(np.array([reach]), 1).toarray() - slope * ending)
+    last = np.array([reach])
+    ending = basis(last, 0).toarray()
+    tied = step * (end * basis(last, 1).toarray() - slope * ending)
     # A source that ends inside has no tail to go on with: the spline ends with the scan.
     free = np.eye(tied.size) if source else np.linalg.svd(tied)[2][1:].T
     curved = basis(nodes, _ORDER).toarray() * step**_ORDER

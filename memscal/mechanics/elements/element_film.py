@@ -65,11 +65,11 @@ class QuarticLine:
         return csr_array((quartics.ravel(), columns.ravel(), rows), shape=(r.size, self.r.size))
 
     @cached_property
-    def mass(self) -> csr_array:
+    def mass(self) -> csc_array:
         r"""Matrix :math:`\int N_i N_j\,r\,dr`."""
         nodes, weights = gauss_between(self.corners, _ORDER)
         values = self.at(nodes)
-        return csr_array(values.T @ values.multiply((weights * nodes)[:, None]))
+        return csc_array(values.T @ values.multiply((weights * nodes)[:, None]))
 
     def loads_of_hats(self, rings: FloatArray) -> csr_array:
         r"""Return :math:`\int N_i \phi_j\,r\,dr` of the rings' hats, exactly."""
@@ -335,7 +335,7 @@ class ElementField:
         line, outward, inward = self.system.side(1.0)
         forces = self.system.matrix[np.append(inward, outward)] @ self.solution
         pushed, held = forces.reshape(2, -1) * self.film.shear_modulus
-        mass = csc_array(line.mass)
+        mass = line.mass
         # On the axis there is no shear.
         shear = np.append(0.0, spsolve(mass[1:, 1:], held[1:]))
         return smooth(line, -spsolve(mass, pushed), 1), smooth(line, shear, -1)

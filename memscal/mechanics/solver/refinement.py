@@ -237,9 +237,10 @@ def _contact_radius(request: RingRequest, rings: FloatArray, state: ContactState
     p = state.pressure
     if request.interface.normal_law:
         # Without an edge: where the pressure has fallen to a small share of its largest.
-        last = np.flatnonzero(p > _EDGE * p.max())[-1]
-        share = (p[last] - _EDGE * p.max()) / (p[last] - p[last + 1])
-        return float(rings[last] + share * (rings[last + 1] - rings[last]))
+        edge = _EDGE * p.max()
+        last = np.flatnonzero(p > edge)[-1]
+        around = slice(last, last + 2)
+        return float(np.interp(-edge, -p[around], rings[around]))
     last = np.flatnonzero(p > 0)[-1]
     if last == 0:
         return float(rings[1]) / 2
