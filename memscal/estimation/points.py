@@ -264,7 +264,7 @@ class ScanPoints:
     ) -> FloatArray:
         """Scale rows, (n,) or (n, m), by the root of their weights, and decorrelate them."""
         place = None if out is None else out.T
-        scaled: FloatArray = np.multiply(values.T, np.sqrt(weights), out=place).T
+        scaled = np.multiply(values.T, np.sqrt(weights), out=place).T
         return self.decorrelation.apply(scaled) if self.decorrelation else scaled
 
     def sharing(self, changes: FloatArray) -> tuple[ScanPoints, float]:

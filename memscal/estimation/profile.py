@@ -276,7 +276,7 @@ def _root(numbers: VoltageMap, noise: FloatArray, factor: Decorrelation | None) 
 
 def dynamics_changes(estimate: ProfileEstimate, kernel: FloatArray) -> Arrays:
     """Return changes (n,) of the voltages, in V, by one u of each number of a sensor's dynamics."""
-    changes: Arrays = {}
+    changes = {}
     if estimate.points.in_motion:
         changes = hook("changes_by_dynamics")(estimate.model, estimate.gaussian.geometry, kernel)
     return changes

@@ -233,7 +233,7 @@ def stated_sensitivities(set_up: SetUp, reference: RadialSpectrum, owner: str) -
     """Change of the reference's transform by each uncertainty stated of a film or an indenter."""
     # Centred differences of the rod's solution, or its relative change for a reference from
     # elsewhere.  At a given load the modulus does not change the stress in a linear film.
-    changes: Arrays = {}
+    changes = {}
     if owner == "film":
         set_up = set_up.expected
     for name, source in _STATED[owner].items():

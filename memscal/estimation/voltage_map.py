@@ -92,13 +92,13 @@ class VoltageMap:
         """Covariance (m, m) of the numbers, for voltages of a noise (n,) and its correlation."""
         parts = []
         for left, right in self.parts:
-            columns: Any = right
+            columns = right
             if factor:
                 dense = right if isinstance(right, np.ndarray) else right.toarray()
                 columns = factor.correlate_adjoint(noise[:, None] * dense)
             parts.append((left, columns))
         scale = None if factor else noise
-        total: FloatArray = np.zeros((len(self), len(self)))
+        total = np.zeros((len(self), len(self)))
         for i, (left, right) in enumerate(parts):
             total += left @ _gram(right, right, scale) @ left.T
             for other, columns in parts[:i]:

@@ -72,7 +72,7 @@ def tabulated_rod(film: ElasticFilm, rod: Rod, load: float, *, sticking: bool) -
     scale = film.shear_modulus * film.thickness**2
     depth = brentq(lambda d: _load(rows, d) - load / scale, 0.0, deepest, xtol=1e-12)
     transforms = rows(np.cbrt(depth))[1:].reshape(2, -1) * load
-    inside: Any = TabulatedField(base_wavenumbers(film), transforms, rod.radius)
+    inside = TabulatedField(base_wavenumbers(film), transforms, rod.radius)
     loads = _load(rows, _STEPS * depth) * scale
     work = float(np.trapezoid(loads, _STEPS * depth * film.thickness))
     return Contact(
