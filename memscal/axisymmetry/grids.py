@@ -117,9 +117,8 @@ class EvenGrid(_Grid):
 
     def from_quotient(self, period: FloatArray) -> FloatArray:
         """Return the even part of a period, as a quarter plane."""
-        # Flipped about its first point, which a plain flip would carry to the last.
-        even = (period + np.roll(period[::-1], 1, axis=0)) / 2
-        return ((even + np.roll(even[:, ::-1], 1, axis=1)) / 2)[: self.count, : self.count]
+        # Its first row and column close it on the other side: the axis is at the central pixel.
+        return self.from_image(np.pad(scipy.fft.fftshift(period), (0, 1), mode="wrap"))
 
     def to_image(self, field: FloatArray) -> FloatArray:
         """Mirror the quarter to the whole plane: odd size, axis at the central pixel."""
@@ -231,19 +230,16 @@ class Lattice(_Grid):
 
     def refined(self, kernel: FloatArray, factor: int) -> tuple[Lattice, FloatArray]:
         """Interpolate a centred kernel to a lattice ``factor`` (odd) times finer, by its series."""
-        m, n = kernel.shape
-        dy, dx = self.spacing
-        spectrum = scipy.fft.rfft2(scipy.fft.ifftshift(kernel))
-        padded = np.zeros((m * factor, n * factor // 2 + 1), dtype=complex)
-        half = m // 2 + 1
-        padded[:half, : n // 2 + 1] = spectrum[:half]
-        padded[half - m :, : n // 2 + 1] = spectrum[half:]
-        fine = scipy.fft.irfft2(padded, s=(m * factor, n * factor)) * factor**2
+        from scipy.signal import resample
 
-        def axis(count: int, step: float) -> FloatArray:
-            return (np.arange(count) - count // 2) * step / factor
-
-        return Lattice(axis(n * factor, dx), axis(m * factor, dy)), scipy.fft.fftshift(fine)
+        fine = scipy.fft.ifftshift(kernel)
+        axes = []
+        for axis, step in enumerate(self.spacing):
+            count = factor * kernel.shape[axis]
+            fine = resample(fine, count, axis=axis)
+            axes.append((np.arange(count) - count // 2) * step / factor)
+        y, x = axes
+        return Lattice(x, y), scipy.fft.fftshift(fine)
 
     def to_period(self, field: FloatArray) -> FloatArray:
         """Return the field itself: it covers the plane, and is its own period."""

@@ -146,6 +146,12 @@ def up_to(end: float, function: ArrayFunction, r: FloatArray) -> FloatArray:
     return np.where(r <= end, function(np.minimum(r, end)), 0.0)
 
 
+def quotient(first: FloatArray | float, second: FloatArray) -> FloatArray:
+    """Return one number over another, zero where that is zero: on an axis, or at a centre."""
+    shape = np.broadcast(first, second).shape
+    return np.divide(first, second, out=np.zeros(shape), where=second != 0)
+
+
 def _mirrored(r: FloatArray, f: FloatArray, order: int) -> ArrayPair:
     """Continue a table beyond the axis by three radii."""
     if r.size < 4:

@@ -1,13 +1,12 @@
 """Radial apparatus functions of unit integral whose transform has a closed form."""
 
-from __future__ import annotations
-
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Protocol, runtime_checkable
 
 import numpy as np
-from scipy.special import chndtr, i0e, j0, j1
+from scipy.special import chndtr, i0e, ive, j1
 
+from memscal.axisymmetry.hankel import bessel
 from memscal.errors import InputError
 from memscal.model.arrays import FloatArray, array_record, require_positive, value_record
 
@@ -186,29 +185,28 @@ class SmoothedDisc:
 
 @array_record
 class Rings:
-    """Blurred rings: ``radius`` and ``blur`` in m, ``amplitude`` in V/Pa; each of shape (m,)."""
+    """Blurred rings: ``radius`` and ``blur`` in m, ``amplitude`` in V/Pa; each of shape (m,).
+
+    Those of an order n vary as the cosine of n times the angle.
+    """
 
     radius: FloatArray
     blur: FloatArray
     amplitude: FloatArray
 
-    @classmethod
-    def joined(cls, parts: Sequence[Rings]) -> Rings:
-        """Return all rings of several sets."""
-        return cls(*np.hstack([[rings.radius, rings.blur, rings.amplitude] for rings in parts]))
-
-    def transform(self, k: FloatArray) -> FloatArray:
+    def transform(self, k: FloatArray, order: int = 0) -> FloatArray:
         """Hankel transforms at ``k`` (rad/m), shape (k, m)."""
         blurred = self.amplitude * np.exp(-0.5 * np.multiply.outer(k, self.blur) ** 2)
-        return blurred * j0(np.multiply.outer(k, self.radius))
+        return blurred * bessel(order, np.multiply.outer(k, self.radius))
 
-    def radial(self, r: FloatArray) -> FloatArray:
+    def radial(self, r: FloatArray, order: int = 0) -> FloatArray:
         """Values at radii ``r`` (m), shape (r, m), in V/Pa/m^2."""
         square = self.blur**2
         # The scaled Bessel function carries exp(-rq/b^2), which completes the square.
         near = np.exp(-0.5 * np.subtract.outer(r, self.radius) ** 2 / square)
-        bessel = i0e(np.multiply.outer(r, self.radius / square))
-        return self.amplitude / (2 * np.pi * square) * near * bessel
+        phase = np.multiply.outer(r, self.radius / square)
+        scaled = ive(order, phase) if order else i0e(phase)
+        return self.amplitude / (2 * np.pi * square) * near * scaled
 
     @property
     def size(self) -> float:

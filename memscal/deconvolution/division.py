@@ -11,10 +11,10 @@ from __future__ import annotations
 
 import inspect
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from functools import cached_property
 from numbers import Integral, Real
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, Protocol
+from typing import Any, ClassVar, Literal, Protocol
 
 import numpy as np
 import scipy.fft
@@ -22,10 +22,7 @@ import scipy.fft
 from memscal.axisymmetry.grids import FieldGrid
 from memscal.errors import InputError, require_names
 from memscal.estimation.bayesian import Bayesian
-from memscal.model.arrays import FloatArray, array_record, keyword_value_record
-
-if TYPE_CHECKING:
-    from importlib.metadata import EntryPoint
+from memscal.model.arrays import FloatArray, Values, array_record, keyword_value_record
 
 #: The paper adds white noise "ten times weaker than the weakest relevant spectral component".
 NOISE_RATIO = 0.1
@@ -240,7 +237,7 @@ _LEFT = ("unsupervised-wiener", "richardson-lucy")
 
 def regulariser_names() -> tuple[str, ...]:
     """Names of every regulariser: memscal's own first, then plug-ins'."""
-    return (*_OWN, *sorted({point.name for point in _plug_ins()} - set(_OWN)))
+    return (*_OWN, *sorted(set(_plug_ins()) - set(_OWN)))
 
 
 def create_regulariser(name: str, /, **options: Any) -> Method:
@@ -278,7 +275,7 @@ def chosen_method(
 def _factory(name: str) -> Any:
     if name in _OWN:
         return _OWN[name]
-    points = {point.name: point for point in _plug_ins()}
+    points = _plug_ins()
     if name in _LEFT and name not in points:
         cure = "docs/own_method.md adds it again, by scikit-image."
         raise InputError(f"There is no method named {name}.", cure=cure)
@@ -293,8 +290,8 @@ def _factory(name: str) -> Any:
         ) from error
 
 
-def _plug_ins() -> Collection[EntryPoint]:
-    """Entry points of other packages; looked up only when one is asked for."""
+def _plug_ins() -> Values:
+    """Entry points of other packages, by name; looked up only when one is asked for."""
     from importlib.metadata import entry_points
 
-    return entry_points(group=ENTRY_POINT_GROUP)
+    return {point.name: point for point in entry_points(group=ENTRY_POINT_GROUP)}

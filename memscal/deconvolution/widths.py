@@ -44,7 +44,8 @@ def fit_gaussian(g: Field, start: float | None = None) -> float:
     root = np.sqrt(r)
     narrowest = 0.5 * float(r[1] - r[0])
     if start is None:
-        start = max(float(1 / np.sqrt(4 * np.pi * g.grid.integrate(g.values**2))), 2 * narrowest)
+        start = float(1 / np.sqrt(4 * np.pi * g.grid.integrate(g.values**2)))
+    start = max(start, 2 * narrowest)
 
     def linearise(scaled: FloatArray) -> ArrayPair:
         """Misfit at a width over ``start``, and its slope."""
@@ -54,7 +55,7 @@ def fit_gaussian(g: Field, start: float | None = None) -> float:
         slope = root * unit_gaussian_slope(r, sigma) * start**3
         return misfit, slope[:, None]
 
-    begin = np.array([max(start, 2 * narrowest) / start])
+    begin = np.ones(1)
     width = gauss_newton(linearise, begin, tolerance=1e-10)
     if width is not None and width[0] * start > 2 * narrowest:
         return float(width[0] * start)
@@ -99,16 +100,13 @@ def _half_width(r: FloatArray, g: FloatArray) -> Functional:
     # With G(q) = G(m)/2, a change of G moves q by -(dG(q) - dG(m)/2) / G'(q).
     fine = np.linspace(r[0], r[-1], _FINE * r.size)
     values = radial_spline(r, g)(fine)
-    top = int(np.argmax(values))
-    last = min(int(np.flatnonzero(values >= values[top] / 2)[-1]), fine.size - 2)
+    top = np.argmax(values)
+    last = min(np.flatnonzero(values >= values[top] / 2)[-1], fine.size - 2)
     slope = (values[last + 1] - values[last]) / (fine[1] - fine[0])
     half = fine[last] + (values[top] / 2 - values[last]) / slope if slope else fine[last]
     row = np.zeros_like(r)
     if slope:
-        # A profile is read at a radius by linear interpolation.
+        # A profile is read at a radius by linear interpolation, between even radii.
         for place, factor in ((half, -2 / slope), (fine[top], 1 / slope)):
-            i = int(np.clip(np.searchsorted(r, place) - 1, 0, r.size - 2))
-            share = (place - r[i]) / (r[i + 1] - r[i])
-            row[i] += factor * (1 - share)
-            row[i + 1] += factor * share
+            row += factor * np.maximum(1 - abs(place - r) / (r[1] - r[0]), 0.0)
     return Functional("fwhm", float(2 * half), row)

@@ -23,9 +23,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from scipy.special import ive
 
-from memscal.axisymmetry.hankel import bessel
+from memscal.axisymmetry.kernels import Rings
 from memscal.estimation.forward import ForwardModel
 from memscal.estimation.gaussian import GaussianFit
 from memscal.model.arrays import FloatArray, IndexArray, array_record
@@ -49,27 +48,19 @@ _SWEEPS = 2
 
 
 @array_record
-class AngularRings:
+class AngularRings(Rings):
     """Blurred rings of unit amplitude: of each order those with a cosine, then with a sine."""
-
-    radius: FloatArray  # (q,), in m
-    blur: float  # in m
 
     @classmethod
     def about(cls, fit: GaussianFit) -> AngularRings:
         """Rings about a Gaussian fit."""
         radius = fit.width * np.arange(_SPACING / 2, _CUT * _EXTENT, _SPACING)
-        return cls(radius, _BLUR * fit.width)
+        return cls(radius, np.full(radius.size, _BLUR * fit.width), np.ones(radius.size))
 
     def signal(self, model: ForwardModel, centres: FloatArray) -> FloatArray:
         """Voltages at the points, for centres (scans, 2) in m: (n, 8 q), in V."""
-        rings = [(m, self.transform(m, model.k)) for m in ORDERS]
+        rings = [(m, self.transform(model.k, m)) for m in ORDERS]
         return np.hstack([model.around(m, each, each, centres) for m, each in rings])
-
-    def transform(self, m: int, k: FloatArray) -> FloatArray:
-        """Transforms of order m at ``k`` (rad/m), (k, q)."""
-        blurred = np.exp(-0.5 * (self.blur * k) ** 2)[:, None]
-        return blurred * bessel(m, np.outer(k, self.radius))
 
 
 @array_record
@@ -82,7 +73,7 @@ class AngularDepartures:
     @property
     def count(self) -> int:
         """How many kernels there are."""
-        return int(self.amplitudes.shape[1])
+        return len(self.amplitudes.T)
 
     def mean(self, _: Callable[..., FloatArray], place: FloatArray) -> FloatArray:
         """Means of the kernels over directions, or their transforms, at places (n,): none."""
@@ -93,17 +84,18 @@ class AngularDepartures:
         from scipy.interpolate import CubicSpline
 
         rings = self.components
-        plane_x, plane_y = (each.ravel() for each in np.meshgrid(x, y))
-        total = np.zeros((plane_x.size, coefficients.shape[1]))
-        step = rings.blur / _PER_BLUR
-        near = np.hypot(plane_x, plane_y) < rings.radius[-1] + _BLURS * rings.blur
-        r = np.hypot(plane_x[near], plane_y[near])
-        angle = np.arctan2(plane_y[near], plane_x[near])
+        radius = np.hypot.outer(y, x).ravel()
+        total = np.zeros((radius.size, coefficients.shape[1]))
+        blur = rings.blur[0]
+        step = blur / _PER_BLUR
+        near = radius < rings.radius[-1] + _BLURS * blur
+        r = radius[near]
+        angle = np.arctan2.outer(y, x).ravel()[near]
         table = step * np.arange(np.ceil(r.max(initial=0.0) / step) + 4)
         for i, amplitudes in enumerate(self._by_rings(coefficients)):
             m = ORDERS[i // 2]
             turn = (np.cos, np.sin)[i % 2]
-            profiles = rings_of_order(m, table, rings.radius, rings.blur) @ amplitudes
+            profiles = rings.radial(table, m) @ amplitudes
             total[near] += turn(m * angle)[:, None] * CubicSpline(table, profiles)(r)
         return total
 
@@ -114,7 +106,7 @@ class AngularDepartures:
         parts = self._by_rings(coefficients)
         total = np.zeros((model.points.u.size, coefficients.shape[1]))
         for i, m in enumerate(ORDERS):
-            rings = self.components.transform(m, model.k)
+            rings = self.components.transform(model.k, m)
             both = model.around(m, rings @ parts[2 * i], rings @ parts[2 * i + 1], centres)
             total += np.add(*np.hsplit(both, 2))
         return total
@@ -128,22 +120,16 @@ class AngularDepartures:
         return rings @ self.amplitudes
 
 
-def rings_of_order(m: int, r: FloatArray, radius: FloatArray, blur: float) -> FloatArray:
-    """Blurred rings of order m at radii (n,) in m, for unit amplitudes: (n, q), in 1/m^2."""
-    near = np.exp(-0.5 * (np.subtract.outer(r, radius) / blur) ** 2)
-    return near * ive(m, np.outer(r, radius / blur**2)) / (2 * np.pi * blur**2)
-
-
 def angular_departures(
     rings: AngularRings, fit: GaussianFit, columns: tuple[FloatArray, ...], noise: float
 ) -> AngularDepartures:
     """Choose the kernels about a Gaussian fit; ``noise`` is that of a point of weight one."""
     # ``columns``, standardised: data (n,), of the fit's parameters, of all radial departures and
     # of the rings, (n, p).
-    from scipy.linalg import block_diag
+    from scipy.linalg import block_diag, null_space
 
     data, flat, radial, by_rings = (values / noise for values in columns)
-    units = _unit_amplitudes(rings.radius, fit.width)
+    units = _unit_amplitudes(rings, fit.width)
     # Shifts of all scans along x and y, then the ellipse along x and along the diagonals.
     parameters = [*fit.shifts(flat).T, *flat[:, -2:].T]
     blocks = []
@@ -152,7 +138,7 @@ def angular_departures(
         if i < len(parameters):
             # All combinations that the scan can tell from that parameter.
             alike = parameters[i] @ (block @ kernels)
-            kernels = kernels @ np.linalg.svd(alike[None])[2][1:].T
+            kernels = kernels @ null_space(alike[None])
         blocks.append(kernels)
     order = np.repeat(np.arange(len(blocks)) // 2, [kernels.shape[1] for kernels in blocks])
     amplitudes = block_diag(*blocks)
@@ -164,14 +150,14 @@ def angular_departures(
     return AngularDepartures(rings, amplitudes * _expected_strengths(free, data, order)[order])
 
 
-def _unit_amplitudes(radius: FloatArray, width: float) -> list[FloatArray]:
+def _unit_amplitudes(rings: AngularRings, width: float) -> list[FloatArray]:
     """Amplitudes (q,) of the rings of each order whose expected L2 norm over the plane is one."""
     extent = _EXTENT * width
     r = np.linspace(0.0, 2 * _CUT * extent, 800)
-    envelope = np.sqrt(radius) * np.exp(-0.5 * (radius / extent) ** 4)
+    envelope = np.sqrt(rings.radius) * np.exp(-0.5 * (rings.radius / extent) ** 4)
     measure = np.pi * r * np.gradient(r)  # half of the plane's: that of a squared cosine
-    rings = [rings_of_order(m, r, radius, _BLUR * width) * envelope for m in ORDERS]
-    return [envelope / np.sqrt(np.sum(measure @ each**2)) for each in rings]
+    profiles = [rings.radial(r, m) * envelope for m in ORDERS]
+    return [envelope / np.sqrt(np.sum(measure @ each**2)) for each in profiles]
 
 
 def _expected_strengths(columns: FloatArray, data: FloatArray, order: IndexArray) -> FloatArray:

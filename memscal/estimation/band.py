@@ -133,7 +133,6 @@ def _falls_below(k: FloatArray, ratio: FloatArray, threshold: float) -> float:
     i = np.flatnonzero(ratio >= threshold).max(initial=-1) + 1
     if i in (0, k.size):
         return float(k[max(i - 1, 0)])
-    upper = np.log(ratio[i - 1])
-    lower = np.log(max(ratio[i], TINY))
-    share = (upper - np.log(threshold)) / (upper - lower)
-    return float(k[i - 1] + (k[i] - k[i - 1]) * share)
+    around = slice(i - 1, i + 1)
+    below = np.log(threshold) - np.log(np.maximum(ratio[around], TINY))
+    return float(np.interp(0.0, below, k[around]))

@@ -303,8 +303,8 @@ def weigh_departures(
     reduced: ReducedScan,
     basis: DepartureBasis,
     effective_count: float,
-    expected_noise: float = 0.0,
     least_noise: float = 0.0,
+    expected_noise: float = 0.0,
 ) -> Weighing:
     """Weigh the hypotheses about departures from a fit."""
     # ``effective_count``: readings in the data, of which a point may be a mean, by their weight.
@@ -439,8 +439,7 @@ def supported(basis: DepartureBasis, weighed: WeighedFit) -> tuple[DepartureBasi
     """Leave out the shapes and families of negligible probability."""
     variances = np.diag(weighed.covariance)
     used = [variances[block].any() for block in basis.blocks]
-    columns = [np.arange(block.start, block.stop) for block in compress(basis.blocks, used)]
-    chosen = np.concatenate([np.arange(basis.flat), *columns])
+    chosen = np.r_[: basis.flat, *compress(basis.blocks, used)]
     rings = tuple(compress(basis.rings, used))
     families = tuple(compress(basis.families, used[len(basis.rings) :]))
     averaged = replace(

@@ -4,7 +4,8 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from scipy.linalg import solve_banded, solve_triangular
+from scipy.linalg import solve_triangular
+from scipy.linalg.lapack import dtbtrs
 
 from memscal.model.arrays import FloatArray, IndexArray, array_record
 from memscal.model.correlation import is_banded
@@ -68,13 +69,11 @@ class SlowNoise:
 
 def _solved(root: FloatArray, values: FloatArray, *, transposed: bool) -> FloatArray:
     """Solve L x = values, or L' x = values."""
+    turned: Any = "T" if transposed else "N"
     if not is_banded(root):
-        return solve_triangular(root, values, lower=True, trans=1 if transposed else 0)
-    below = len(root) - 1
-    if not transposed:
-        return solve_banded((below, 0), root, values)
-    upper = np.stack([np.roll(diagonal, i) for i, diagonal in enumerate(root)])
-    return solve_banded((0, below), upper[::-1], values)
+        return solve_triangular(root, values, lower=True, trans=turned)
+    solved, _ = dtbtrs(root, values, uplo="L", trans=turned)
+    return np.reshape(solved, values.shape)
 
 
 def _product(root: FloatArray, values: FloatArray, *, transposed: bool) -> FloatArray:

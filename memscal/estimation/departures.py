@@ -180,7 +180,6 @@ class ReducedScan:
     ) -> ReducedScan:
         """Reduce a scan with weights (n,), with components of what is not round, or without."""
         points = model.points
-        count = fit.jacobian.shape[1]
         first = [(points.u - fit.predicted)[:, None], fit.jacobian]
         if components:
             first.append(components.signal(model, fit.centre))
@@ -196,7 +195,7 @@ class ReducedScan:
             right = points.unstandardise(columns, weights)
             right = right.astype(np.float32) if len(right) > SINGLE else right
             columns = reduced
-        parts = columns[:, 0], columns[:, 1 : 1 + count], columns[:, 1 + count : last]
+        parts = columns[:, 0], columns[:, 1 : 1 + fit.count], columns[:, 1 + fit.count : last]
         return cls(model, fit, *parts, weights, synthesis, right)
 
     def signal(self, kernels: FloatArray) -> FloatArray:
@@ -262,10 +261,9 @@ class DepartureBasis:
     ) -> FloatArray:
         """Voltages at the points of combinations of all columns, (p,) or (p, m): (n,) or (n, m)."""
         # Coefficients are few: of a million points there is no room for all columns.
-        count = fit.jacobian.shape[1]
-        volts = fit.jacobian @ coefficients[:count]
+        volts = fit.jacobian @ coefficients[: fit.count]
         if self.angular:
-            angular = coefficients[count : self.flat].reshape(self.flat - count, -1)
+            angular = coefficients[fit.count : self.flat].reshape(self.angular.count, -1)
             volts += self.angular.signal(model, fit.centre, angular).reshape(volts.shape)
         kernels = self.kernels(model.k)[:, self.flat :]
         return volts + model.signal(fit.geometry, kernels @ coefficients[self.flat :])
@@ -288,8 +286,7 @@ class DepartureBasis:
             parts = [gaussian[:, None], slope[:, None], none]
             if self.angular:
                 parts.append(self.angular.mean(side.rings, place))
-            if self.rings:
-                parts.append(side.rings(Rings.joined(self.rings), place))
+            parts += [side.rings(rings, place) for rings in self.rings]
             if self.families:
                 parts.append(self._families(gaussian[:, None], place, side))
             table = np.hstack(parts)
@@ -327,7 +324,7 @@ def departure_basis(
     if not isinstance(angular, PlaneDepartures):
         rings = tuple(shape.rings(fit.width, fit.conversion_constant) for shape in SHAPES)
         families = tuple(_fitted_families(reduced)) if reduced else ()
-    flat = fit.jacobian.shape[1] + (angular.count if angular else 0)
+    flat = fit.count + (angular.count if angular else 0)
     return DepartureBasis(fit.conversion_constant, fit.sigma, flat, rings, families, angular)
 
 
@@ -357,14 +354,9 @@ def _fitted_families(reduced: ReducedScan) -> Iterator[FamilyFit]:
         voltages = np.pad(reduced.signal(both), ((0, left.size), (0, 0)))
         signal, wider = np.hsplit(voltages - others @ (others.T @ voltages), 2)
         # Least squares in A and A d ln(width), of all families at once.
-        slope = (wider - signal) / step
-        a = np.sum(signal**2, axis=0)
-        b = np.sum(signal * slope, axis=0)
-        c = np.sum(slope**2, axis=0)
-        determinant = a * c - b**2
-        amplitudes = (c * (data @ signal) - b * (data @ slope)) / determinant
-        growth = (a * (data @ slope) - b * (data @ signal)) / determinant / amplitudes
-        growth = np.clip(growth, -_LONGEST, _LONGEST)
+        columns = np.stack([signal, (wider - signal) / step]).T
+        amplitudes, moved = (np.linalg.pinv(columns) @ data).T
+        growth = np.clip(moved / amplitudes, -_LONGEST, _LONGEST)
         widths = widths * np.exp(growth)
         if abs(growth).max() < _SETTLED:
             break

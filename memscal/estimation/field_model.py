@@ -7,7 +7,7 @@ on a grid, and at the points by quintic splines through it; its slopes are the s
 
 from dataclasses import replace
 from functools import cached_property
-from typing import Any, ClassVar, cast
+from typing import Any, ClassVar
 
 import numpy as np
 import scipy.fft
@@ -127,12 +127,12 @@ class FieldModel(ForwardModel):
 
         return CubicSpline(self.k, kernels, axis=1)(np.hypot(self._plane.ky, self._plane.kx))
 
-    def _read(self, geometry: Geometry, spectra: Any) -> FloatArray:
+    def _read(self, geometry: Any, spectra: Any) -> FloatArray:
         """Read voltages (n, k) or (n, m, k) at the points for k transforms on the cells."""
         from scipy.ndimage import map_coordinates
 
         plane = self._plane
-        places = cast(PlaneGeometry, geometry).places
+        places = geometry.places
         values = np.zeros((*places.shape[1:], len(spectra)))
         shape = (plane.count, plane.count)
         whole = np.zeros((plane.count, plane.count // 2 + 1), complex)

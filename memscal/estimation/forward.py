@@ -28,7 +28,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 from scipy.special import ive, j1
 
-from memscal.axisymmetry.hankel import ACROSS, RadialSpectrum, bessel, radial_spline
+from memscal.axisymmetry.hankel import ACROSS, RadialSpectrum, bessel, quotient, radial_spline
 from memscal.axisymmetry.kernels import gaussian_transfer
 from memscal.estimation.points import ScanPoints
 from memscal.estimation.voltage_map import BLOCK, DENSE
@@ -167,8 +167,8 @@ class Geometry:
         """How many first nodes factors need: all, a half, a quarter and so on."""
         # A source with an edge has many waves, of which a wide kernel passes few.
         size = abs(spread)
-        used = np.flatnonzero(size > _NO_SHARE * size.max(initial=0.0))
-        needed = 1 + (used[-1] // (spread.size // len(spread)) if used.size else 0)
+        used = np.nonzero(size > _NO_SHARE * size.max(initial=0.0))[0]
+        needed = 1 + used.max(initial=0)
         halvings = int(np.log2(self.k.size / needed))
         return int(np.ceil(self.k.size / 2**halvings))
 
@@ -233,7 +233,7 @@ class ForwardModel:
             positions = self.points.positions[:, inside]
             half = np.ptp(positions, axis=1, keepdims=True) / 2
             middle = positions.min(axis=1, keepdims=True) + half
-            within[:, inside] = (positions - middle) / np.where(half > 0, half, 1.0)
+            within[:, inside] = quotient(positions - middle, half)
         return within
 
     @property
@@ -268,7 +268,7 @@ class ForwardModel:
         """Return distances and Bessel functions for trial centres, shape (scans, 2), in m."""
         offset = self.offset(centres)
         radius = np.hypot(*offset)
-        towards = -offset / np.where(radius > 0, radius, 1.0)
+        towards = -quotient(offset, radius)
         return Geometry(radius, towards, self.k, self.reference.order == ACROSS, self.reach)
 
     def signal(self, geometry: Geometry, kernel: FloatArray) -> FloatArray:
@@ -289,8 +289,14 @@ class ForwardModel:
             return np.hstack(first), None
         strongest = np.abs(self._measures).max(axis=0)
         reach = _REACHES * geometry.radius.max() / geometry.reach
-        table = (points.order, geometry.across, geometry.reach, self.k.tobytes())
-        size, right, splines = _seen_waves(*table, math.ceil(reach), strongest.tobytes())
+        size, right, splines = _seen_waves(
+            points.order,
+            geometry.across,
+            geometry.reach,
+            self.k.tobytes(),
+            math.ceil(reach),
+            strongest.tobytes(),
+        )
         interpolation = geometry.interpolation(self.k.size)
         factor = points.load
         if points.order:
@@ -305,7 +311,7 @@ class ForwardModel:
             for block in slices(factor.size, BLOCK):
                 waves = interpolation[block] @ splines
                 columns[block, place] = waves * own_factor[block, None]
-            share = self._measures[scans[0]] / np.where(strongest > 0, strongest, 1.0)
+            share = quotient(self._measures[scans[0]], strongest)
             mixes.append(size[:, None] * right * share)
             start += size.size
         return columns, np.vstack(mixes)
@@ -364,7 +370,7 @@ class ForwardModel:
             slope += phasor.real[:, 0] * steepness
             turn -= 2 * m * phasor.imag[:, 0] * profiles[:, 0]
             phasor *= step
-        turn = np.divide(turn, geometry.radius, out=turn, where=geometry.radius > 0)
+        turn = quotient(turn, geometry.radius)
         return responses, geometry.towards * slope + np.stack([-across, toward]) * turn
 
     def around(
@@ -381,10 +387,7 @@ class ForwardModel:
 
     def spotted(self, places: FloatArray, width: float, centres: FloatArray) -> FloatArray:
         """Voltages of Gaussians of unit integral at places (2, m) from centres, in m: (n, m)."""
-        along, across = (
-            np.subtract.outer(*pair) for pair in zip(self.offset(centres), places, strict=True)
-        )
-        distance = np.hypot(along, across)
+        distance = np.hypot(*(self.offset(centres)[:, :, None] - places[:, None]))
         table = np.arange(0.0, distance.max() + width, width / _PER_WIDTH)
         volts = np.empty(distance.shape)
         for scan, reference in enumerate(self.references):

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from memscal.axisymmetry.hankel import quotient
 from memscal.axisymmetry.kernels import gaussian_transfer, gaussian_transfer_slope
 from memscal.errors import FitError, InputError
 from memscal.estimation.ellipse import elliptic_columns
@@ -149,7 +150,7 @@ def _robust_start_of_scan(model: ForwardModel, weights: FloatArray) -> ArrayTrip
     odd = factors
     if points.order:
         along = points.positions[model.axis] - centres[:, model.axis, None]
-        odd = factors * along / np.where(distances > 0, distances, 1.0)
+        odd = factors * quotient(along, distances)
     shapes = np.concatenate([np.interp(distances, radii, table) * odd for table in tables])
     amplitudes, costs = _amplitudes(shapes, data, drift)
     if points.order:
@@ -171,7 +172,7 @@ def _amplitudes(shapes: FloatArray, data: FloatArray, drift: FloatArray) -> Arra
     free = shapes - (shapes @ base) @ base.T
     rest = data - base @ (base.T @ data)
     square = np.sum(free**2, axis=1)
-    amplitudes = np.divide(free @ rest, square, out=np.zeros_like(square), where=square > 0)
+    amplitudes = quotient(free @ rest, square)
     return amplitudes, abs(rest - amplitudes[:, None] * free).sum(axis=1)
 
 
@@ -245,6 +246,11 @@ class GaussianFit:
         """L2 norm of the round Gaussian of that width, in V/Pa/m."""
         return float(self.conversion_constant / (2 * np.sqrt(np.pi) * self.width))
 
+    @property
+    def count(self) -> int:
+        """How many parameters it has."""
+        return len(self.jacobian.T)
+
     def shifts(self, columns: FloatArray) -> FloatArray:
         """Of columns (n, p) by the parameters, shifts of all scans along x and along y, (n, 2)."""
         return columns[:, self.points.centres] @ np.eye(2)[np.nonzero(self.points.free)[1]]
@@ -252,7 +258,7 @@ class GaussianFit:
     @property
     def prior(self) -> ArrayPair:
         """Further rows (c, p) of the jacobian by the curvatures' prior, and their residuals."""
-        rows = self.points.prior_rows[:, : self.jacobian.shape[1]]
+        rows = self.points.prior_rows[:, : self.count]
         return rows, -rows.sum(axis=1) * self.drift[self.drift.size - len(rows) :]
 
     def has_width(self, weights: FloatArray, noise: float) -> bool:
@@ -379,18 +385,18 @@ def linearise(model: ForwardModel, theta: FloatArray) -> GaussianFit:
     ellipticity = np.zeros(2)
     ellipticity[: points.ellipse] = theta[ellipse:]
     geometry = model.geometry(centre)
-    kernel = gaussian_transfer(model.k, sigma)
     if points.ellipse:
         columns, shift = elliptic_columns(model, geometry, sigma, ellipticity)
-        shift = amplitude * shift
     else:
-        shift = model.shift_derivative(geometry, amplitude * kernel)
+        kernel = gaussian_transfer(model.k, sigma)
+        shift = model.shift_derivative(geometry, kernel)
         both = np.column_stack([kernel, gaussian_transfer_slope(model.k, sigma)])
         columns = model.signal(geometry, both)
-    signal = columns[:, :1]
     by_shape = amplitude * columns[:, 1 : 2 + points.ellipse]
-    centring = model.by_free_centres(shift)
-    jacobian = np.hstack([signal, by_shape[:, :1], centring, model.drift_columns, by_shape[:, 1:]])
+    centring = model.by_free_centres(amplitude * shift)
+    jacobian = np.hstack(
+        [columns[:, :1], by_shape[:, :1], centring, model.drift_columns, by_shape[:, 1:]]
+    )
     predicted = amplitude * columns[:, 0] + model.drift_columns @ drift
     return GaussianFit(
         theta, amplitude, sigma, centre, drift, ellipticity, points, geometry, jacobian, predicted

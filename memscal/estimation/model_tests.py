@@ -148,9 +148,9 @@ def _add(estimate: ProfileEstimate, columns: FloatArray) -> ExtraColumns:
     weights = estimate.weights / estimate.noise_scale**2
     scale = abs(columns).max(axis=0)
     columns = columns / scale
-    jacobian = estimate.gaussian.jacobian
-    count = jacobian.shape[1] - estimate.points.ellipse
-    gaussian = jacobian[:, :count] / np.linalg.norm(jacobian[:, :count], axis=0)
+    count = estimate.gaussian.count - estimate.points.ellipse
+    round_ = estimate.gaussian.jacobian[:, :count]
+    gaussian = round_ / np.linalg.norm(round_, axis=0)
     left = (estimate.weighed.residual + estimate.oval)[:, None]
     # What the triangular factor has below the rows of the round columns is free of them.
     root = triangular(estimate.points.standardised(np.hstack([gaussian, columns, left]), weights))

@@ -15,6 +15,7 @@ from collections.abc import Callable
 from itertools import product
 
 import numpy as np
+from scipy.linalg import null_space
 from scipy.special import logsumexp
 
 from memscal.axisymmetry.kernels import Rings
@@ -125,7 +126,7 @@ class PlaneDepartures:
     @property
     def count(self) -> int:
         """How many kernels there are."""
-        return int(self.amplitudes.shape[1])
+        return len(self.amplitudes.T)
 
     def mean(self, of: Callable[[Rings, FloatArray], FloatArray], place: FloatArray) -> FloatArray:
         """Means of the kernels over directions, or their transforms, at places (n,): (n, count)."""
@@ -176,7 +177,7 @@ def plane_departures(
     parameters = np.hstack([flat[:, :2], fit.shifts(flat), flat[:, -2:]])
     parameters = parameters / np.linalg.norm(parameters, axis=0)
     alike = parameters.T @ by_spots @ (spots.shown.T @ amplitudes)
-    return PlaneDepartures(spots, amplitudes @ np.linalg.svd(alike)[2][len(alike) :].T)
+    return PlaneDepartures(spots, amplitudes @ null_space(alike))
 
 
 def _expected_covariance(

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from memscal.errors import FitError, InputError
 from memscal.estimation.decorrelation import Decorrelation
 from memscal.extensions import hook
-from memscal.model.arrays import BoolArray, FloatArray, IndexArray, array_record
+from memscal.model.arrays import BoolArray, FloatArray, IndexArray, Values, array_record
 from memscal.model.correlation import is_banded, of_points, root_of
 from memscal.model.instrument import Dynamics
 from memscal.model.notation import VOLTS, Reading
@@ -252,7 +252,7 @@ class ScanPoints:
 
     def selected(self, chosen: IndexArray) -> ScanPoints:
         """Return some of the points, without their correlations."""
-        columns: dict[str, Any] = {
+        columns: Values = {
             name: value[chosen]
             for name, value in vars(self).items()
             if isinstance(value, np.ndarray) and name not in ("free", "averaging", "curvature")
@@ -264,7 +264,7 @@ class ScanPoints:
     ) -> FloatArray:
         """Scale rows, (n,) or (n, m), by the root of their weights, and decorrelate them."""
         place = None if out is None else out.T
-        scaled: FloatArray = np.multiply(values.T, np.sqrt(weights), out=place).T
+        scaled = np.multiply(values.T, np.sqrt(weights), out=place).T
         return self.decorrelation.apply(scaled) if self.decorrelation else scaled
 
     def sharing(self, changes: FloatArray) -> tuple[ScanPoints, float]:
@@ -295,16 +295,15 @@ class ScanPoints:
         every = np.arange(place.size)
         known = self.decorrelation
         root = own[:, None] * known.correlate(np.eye(every.size)) if known else own[None]
-        points = replace(self, decorrelation=Decorrelation(((every, root),)))
-        columns = csr_array((share, (every, place)))
+        factor = Decorrelation(((every, root),))
         if known:
-            assert points.decorrelation
-            return points.sharing(points.decorrelation.apply(columns.toarray()))[0]
+            columns = factor.apply(csr_array((share, (every, place))).toarray())
+            return replace(self, decorrelation=factor).sharing(columns)[0]
         # No reading has two positions: the columns are orthogonal.
         square = np.bincount(place, (share / own) ** 2)
         size = np.sqrt(np.where(square > 0, square, 1.0))
         common = csr_array((share / own / size[place], (every, place)))
-        factor = Decorrelation(((every, root),), ((common, np.sqrt(1 + square)),))
+        factor = replace(factor, common=((common, np.sqrt(1 + square)),))
         return replace(self, decorrelation=factor)
 
     def unstandardise(self, columns: FloatArray, weights: FloatArray) -> FloatArray:
@@ -488,7 +487,9 @@ def joined_points(scans: Sequence[ScanPoints], owners: Sequence[int] | None = No
             cure="Give scans of one sensor, or correct /entry/instrument/stress_sensor/dynamics.",
         )
     names = ("x", "y", "u", "load", "x_errors", "velocity", "branch", "anew", "repeat", *own)
-    columns = {name: np.concatenate([getattr(each, name) for each in scans]) for name in names}
+    columns: Values = {
+        name: np.concatenate([getattr(each, name) for each in scans]) for name in names
+    }
     columns["repeat"] += before[number]
     blocks = []
     first = 0
@@ -496,17 +497,14 @@ def joined_points(scans: Sequence[ScanPoints], owners: Sequence[int] | None = No
         if points.decorrelation:
             blocks += [(rows + first, root) for rows, root in points.decorrelation.blocks]
         first += points.u.size
-    return ScanPoints(
+    return replace(
+        scans[0],
         **columns,
         u_errors=np.concatenate(stated) if stated else None,
         owner=number if owners is None else np.array(owners)[number],
         scan=number,
         missing=sum(points.missing for points in scans),
         decorrelation=Decorrelation(tuple(blocks)) if blocks else None,
-        channel=scans[0].channel,
-        reading=scans[0].reading,
-        unit=scans[0].unit,
-        dynamics=scans[0].dynamics,
     )
 
 

@@ -207,7 +207,7 @@ class ProfileEstimate:
             ellipse = np.append(fit.sigma, fit.ellipticity)
             oval = elliptic_departure(x, y, fit.sigma, fit.ellipticity).ravel()
             changes += np.outer(oval, coefficients[0])
-            end = fit.jacobian.shape[1]
+            end = fit.count
             for i, row in enumerate((1, end - 2, end - 1)):
                 step = _STEP * (fit.sigma if row == 1 else 1.0)
                 moved = ellipse.copy()
@@ -276,7 +276,7 @@ def _root(numbers: VoltageMap, noise: FloatArray, factor: Decorrelation | None) 
 
 def dynamics_changes(estimate: ProfileEstimate, kernel: FloatArray) -> Arrays:
     """Return changes (n,) of the voltages, in V, by one u of each number of a sensor's dynamics."""
-    changes: Arrays = {}
+    changes = {}
     if estimate.points.in_motion:
         changes = hook("changes_by_dynamics")(estimate.model, estimate.gaussian.geometry, kernel)
     return changes
@@ -313,7 +313,7 @@ def estimate_profile(
         outlier = start.outlier_weight
     else:
         outlier = point_weights(points, residual, stated, 2 * OUTLIER_THRESHOLD)
-    for rounds_left in range(_WEIGHING_ROUNDS - 1, -1, -1):
+    for rounds_left in reversed(range(_WEIGHING_ROUNDS)):
         weights = stated * outlier
         fit = fit_gaussian_to_points(model, weights, start=fit)
         done_with("Gaussian fit")
@@ -326,7 +326,7 @@ def estimate_profile(
         updated = point_weights(points, residual, stated, OUTLIER_THRESHOLD)
         # The noise of the voltages alone: a curvature beyond its prior is none.
         left = points.standardised(residual, weights)
-        freedom = max(count - fit.jacobian.shape[1], 1.0)
+        freedom = max(count - fit.count, 1.0)
         unit = max(np.sqrt(left @ left / freedom), noise)
         # A residual counts by the root of its weight.
         weighed_alike = np.allclose(updated**0.5, outlier**0.5, atol=0.02)
@@ -361,20 +361,19 @@ def _weighed(
     rings = AngularRings.about(fit) if angular else None
     reduced = ReducedScan.of(model, fit, weights, rings)
     basis = departure_basis(fit, reduced)
-    noises = {"effective_count": count, "least_noise": noise}
     if not rings:
-        return basis, bayesian.weigh_departures(reduced, basis, **noises).average()
-    radial = reduced.signal(basis.kernels(model.k)[:, fit.jacobian.shape[1] :])
+        return basis, bayesian.weigh_departures(reduced, basis, count, noise).average()
+    radial = reduced.signal(basis.kernels(model.k)[:, fit.count :])
     columns = (reduced.data, reduced.flat, radial, reduced.components)
     basis = departure_basis(fit, reduced, angular_departures(rings, fit, columns, noise))
-    about_centre = bayesian.weigh_departures(reduced, basis, **noises)
+    about_centre = bayesian.weigh_departures(reduced, basis, count, noise)
     if fit.points.u.size > MOST_READINGS:
         return basis, about_centre.average()
     spots = Spots.about(fit, model, weights, noise)
     reduced = ReducedScan.of(model, fit, weights, spots)
     free = plane_departures(spots, fit, (reduced.data, reduced.flat, reduced.components), noise)
     free_basis = departure_basis(fit, reduced, free)
-    free_weighing = bayesian.weigh_departures(reduced, free_basis, **noises)
+    free_weighing = bayesian.weigh_departures(reduced, free_basis, count, noise)
     if free_weighing.evidence >= about_centre.evidence + _CLEARLY:
         weighed = free_weighing.average()
         # Noise that grows with the signal, as by errors of the stage, would be taken for G.
@@ -423,7 +422,7 @@ def gaussian_log_marginal(estimate: ProfileEstimate, fit: GaussianFit) -> float:
     # The prior of a curvature is a further reading.
     _, prior = fit.prior
     left = np.append(fit.points.standardised(fit.points.u - fit.predicted, weights), prior)
-    freedom = estimate.outlier_weight.sum() + prior.size - fit.jacobian.shape[1]
+    freedom = estimate.outlier_weight.sum() + prior.size - fit.count
     variance = max(left @ left / freedom, _least_noise(fit) ** 2)
     loss = freedom * math.log(variance) + left @ left / variance
     # The flat priors are of ln A and ln(width).

@@ -9,7 +9,13 @@ from itertools import product
 
 import numpy as np
 
-from memscal.axisymmetry.hankel import ACROSS, RadialSpectrum, Wavenumbers, hankel_transform
+from memscal.axisymmetry.hankel import (
+    ACROSS,
+    RadialSpectrum,
+    Wavenumbers,
+    hankel_transform,
+    quotient,
+)
 from memscal.errors import FitError, InputError
 from memscal.estimation.forward import ForwardModel
 from memscal.estimation.gaussian import MOST_AT_START, fit_gaussian_to_points, some_points
@@ -17,7 +23,7 @@ from memscal.estimation.points import ScanPoints
 from memscal.estimation.set_up import film_of
 from memscal.mechanics.contact import BaseStress, Contact
 from memscal.mechanics.press_rod import UNSOLVED, is_tabulated, press_rod, stick_and_slide
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import Arrays, FloatArray
 from memscal.model.film import LINEAR, NEO_HOOKEAN, more_and_less
 from memscal.model.indenter import Rod
 from memscal.model.scan import Scan, SetUp
@@ -223,13 +229,11 @@ _STATED = {
 }
 
 
-def stated_sensitivities(
-    set_up: SetUp, reference: RadialSpectrum, owner: str
-) -> dict[str, FloatArray]:
+def stated_sensitivities(set_up: SetUp, reference: RadialSpectrum, owner: str) -> Arrays:
     """Change of the reference's transform by each uncertainty stated of a film or an indenter."""
     # Centred differences of the rod's solution, or its relative change for a reference from
     # elsewhere.  At a given load the modulus does not change the stress in a linear film.
-    changes: dict[str, FloatArray] = {}
+    changes = {}
     if owner == "film":
         set_up = set_up.expected
     for name, source in _STATED[owner].items():
@@ -256,13 +260,13 @@ def load_sensitivities(
     return changes
 
 
-def law_sensitivities(set_up: SetUp, reference: RadialSpectrum) -> dict[str, FloatArray]:
+def law_sensitivities(set_up: SetUp, reference: RadialSpectrum) -> Arrays:
     """Change of the reference's transform by what is not known of the film's law."""
     # Rectangles: half as wide as the difference of a linear film is large where no law is stated
     # (``model_form``), and as half that of sticking and sliding where the friction of a rod on a
     # film at finite strain is not (``rod_friction``), for the reference is midway.
     film = set_up.film
-    changes: dict[str, FloatArray] = {}
+    changes: Arrays = {}
     if film.law == LINEAR or not isinstance(set_up.indenter, Rod):
         return changes
     if not film.law:
@@ -291,9 +295,9 @@ def difference(set_up: SetUp, reference: RadialSpectrum, more: SetUp, less: SetU
     """Difference of two rods per newton, scaled from the scan's own rod to the reference."""
     law = law_at_once(set_up)
     rods = (more, less, set_up)
-    upper, lower, own = (rod_spectrum(r, reference, law) * set_up.load / r.load for r in rods)
+    upper, lower, own = (rod_spectrum(r, reference, law) / r.load for r in rods)
     # Zero where the scan's own ends.
-    return reference.values * np.divide(upper - lower, own, out=np.zeros_like(own), where=own != 0)
+    return reference.values * quotient(upper - lower, own)
 
 
 def law_at_once(set_up: SetUp) -> str:

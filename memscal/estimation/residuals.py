@@ -7,13 +7,12 @@ and every combination of departures that stands above a share of the noise.  Wha
 :math:`(1 - QQ^T)z`, does not depend on G.
 """
 
-from __future__ import annotations
-
 import math
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.linalg import orth
+from scipy.sparse import csr_array, diags_array
 from scipy.special import chdtrc, chdtri, fdtrc, fdtri, gammaincc, gammainccinv
 
 from memscal.estimation.points import grouped
@@ -21,9 +20,6 @@ from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.voltage_map import DENSE, orthonormalised, triangular
 from memscal.model.arrays import TINY, FloatArray, IndexArray, array_record, slices, value_record
 from memscal.model.checks import FALSE_ALARM, OUTLIER_WEIGHT
-
-if TYPE_CHECKING:
-    from scipy.sparse import csr_array
 
 #: A departure of the expected size that moves no voltage by this share of its noise is left out.
 _SHARE_OF_NOISE = 0.1
@@ -86,7 +82,7 @@ def free_model(estimate: ProfileEstimate, *, clip_outliers: bool = False) -> Fre
     q, columns = orthonormalised(columns)
     # Angular departures are no parameters: what of them stands above the noise counts.
     _, flat, around, rings = np.split(
-        columns, [1, 1 + fit.jacobian.shape[1], columns.shape[1] - len(mixed)], axis=1
+        columns, [1, 1 + fit.count, columns.shape[1] - len(mixed)], axis=1
     )
     if basis.angular:
         around = basis.angular.combined(around)
@@ -145,10 +141,9 @@ def residuals_of(estimate: ProfileEstimate, model: FreeModel | None = None) -> R
     """Project a scan off all voltages that an apparatus function can make."""
     model = model or free_model(estimate)
     points = estimate.points
-    runs_along_x = points.free[points.scan, 0]
-    along = np.where(runs_along_x, points.x, points.y)
-    across = np.where(runs_along_x, points.place_numbers("row"), 0)
-    order = np.lexsort((along, across, points.repeat, points.scan))
+    # A line along y has a row for each place.
+    across = points.free[points.scan, 0] * points.place_numbers("row")
+    order = np.lexsort((points.along(points.positions), across, points.repeat, points.scan))
     place = np.argsort(order)
     sequence = grouped(across, points.repeat, points.scan)
     order = np.argsort(place[model.point])
@@ -258,8 +253,6 @@ def neighbour_correlation_test(residuals: Residuals) -> TestOutcome:
     # 1950, with more lags).  Normal noise of nu degrees gives it the mean S1/nu and the central
     # moments 2 S2 / nu(nu+2) and 8 S3 / nu(nu+2)(nu+4), where S1 = tr (1 - QQ')W and
     # Sp = tr [(1 - QQ')(W - S1/nu)]^p; the p-value is that of a gamma distribution (Pearson III).
-    from scipy.sparse import diags_array
-
     nu = residuals.degrees
     values = residuals.values
     place = residuals.place
@@ -323,5 +316,4 @@ def orthonormal(design: FloatArray, size: FloatArray | None = None) -> FloatArra
     scaled = design / np.where(size > 0, size, 1.0)
     if len(scaled) > DENSE:
         return orthonormalised(scaled, np.ones_like(size), _DEPENDENT)[0]
-    left, singular, _ = np.linalg.svd(scaled, full_matrices=False)
-    return left[:, singular > _DEPENDENT * singular[0]]
+    return orth(scaled, rcond=_DEPENDENT)

@@ -19,14 +19,13 @@ reference.
 For given centre, weights and :math:`\lambda` the result is linear in the voltages.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cached_property, lru_cache
-from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
+from scipy.linalg import solve_triangular
+from scipy.sparse import block_diag, csr_array, eye_array, vstack
 from scipy.special import j0, j1
 
 from memscal.axisymmetry.hankel import ACROSS, RadialSpectrum, Wavenumbers, gauss_between
@@ -36,10 +35,7 @@ from memscal.estimation.voltage_map import DENSE, VoltageMap
 from memscal.model.arrays import ArrayTriple, FloatArray, IndexArray, array_record
 from memscal.model.checks import OUTLIER_WEIGHT
 
-if TYPE_CHECKING:
-    from scipy.sparse import csr_array
-
-Splines: TypeAlias = "Callable[[FloatArray, int], csr_array]"
+Splines = Callable[[FloatArray, int], csr_array]
 #: Order of the derivative that is penalised; the spline is of degree 2 m - 1.
 _ORDER = 3
 _DEGREE = 2 * _ORDER - 1
@@ -160,9 +156,6 @@ def _smoothed(
     """Smooth y (n,) by the restricted likelihood: coefficients of the free splines by y."""
     # ``splines`` (n, b) at the points, which lie in an ``interval`` each; ``free`` (b, m) of them,
     # and the triangular root (m, m) of their penalty.
-    from scipy.linalg import solve_triangular
-    from scipy.sparse import eye_array
-
     root = np.sqrt(weight)
     weighted = splines.multiply(root[:, None]).tocsr()
     # Between two knots few splines differ from zero: each interval has few rows in R.
@@ -184,8 +177,6 @@ def _smoothed(
 
 def _by_intervals(weighted: csr_array, interval: IndexArray) -> tuple[csr_array, FloatArray]:
     """QR decomposition of B-splines at points, interval by interval: Q (n, r) and R (r, b)."""
-    from scipy.sparse import block_diag, csr_array
-
     order = np.argsort(interval, kind="stable")
     starts = np.flatnonzero(np.diff(interval[order])) + 1
     factors = []
@@ -248,8 +239,9 @@ def _layout(
     peak, end = reference.at(np.array([0.0, reach]))
     slope = -(measure * k * per_newton) @ j1(k * reach)
     # At R a spline has the logarithmic slope of the tail, which goes on from there.
-    ending = basis(np.array([reach]), 0).toarray()
-    tied = step * (end * basis(np.array([reach]), 1).toarray() - slope * ending)
+    last = np.array([reach])
+    ending = basis(last, 0).toarray()
+    tied = step * (end * basis(last, 1).toarray() - slope * ending)
     # A source that ends inside has no tail to go on with: the spline ends with the scan.
     free = np.eye(tied.size) if source else np.linalg.svd(tied)[2][1:].T
     curved = basis(nodes, _ORDER).toarray() * step**_ORDER
@@ -270,7 +262,6 @@ def _layout(
 def _even_splines(knots: FloatArray) -> Splines:
     """Return even B-splines on even knots from zero: their derivatives at radii, (n, m)."""
     from scipy.interpolate import BSpline
-    from scipy.sparse import csr_array, eye_array, vstack
 
     right = np.append(knots, knots[-1] + knots[1] * np.arange(1, _DEGREE + 1))
     extended = np.append(-right[:0:-1], right)

@@ -8,16 +8,14 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 
 from memscal.estimation.decorrelation import Decorrelation
 from memscal.model.arrays import ArrayPair, FloatArray, IndexArray, array_record, floats, slices
-
-if TYPE_CHECKING:
-    from scipy.sparse import csr_array
 
 #: Points up to which matrices over the points are not taken apart.
 DENSE = 400
@@ -28,7 +26,7 @@ BLOCK = 8_192
 #: Columns are dependent where their singular value is below this share of the largest.
 _DEPENDENT = 1e-12
 
-Tall: TypeAlias = "FloatArray | csr_array"
+Tall = FloatArray | csr_array
 """Columns over the points, (n, r)."""
 
 
@@ -87,8 +85,6 @@ class VoltageMap:
 
     def over(self, factors: FloatArray, rows: IndexArray, count: int) -> VoltageMap:
         """Derivatives by ``count`` voltages, of which these, times factors (n,), are ``rows``."""
-        from scipy.sparse import csr_array
-
         placing: Any = csr_array((factors, (rows, np.arange(rows.size))), shape=(count, rows.size))
         return VoltageMap(tuple((left, placing @ right) for left, right in self.parts))
 
@@ -96,13 +92,13 @@ class VoltageMap:
         """Covariance (m, m) of the numbers, for voltages of a noise (n,) and its correlation."""
         parts = []
         for left, right in self.parts:
-            columns: Any = right
+            columns = right
             if factor:
                 dense = right if isinstance(right, np.ndarray) else right.toarray()
                 columns = factor.correlate_adjoint(noise[:, None] * dense)
             parts.append((left, columns))
         scale = None if factor else noise
-        total: FloatArray = np.zeros((len(self), len(self)))
+        total = np.zeros((len(self), len(self)))
         for i, (left, right) in enumerate(parts):
             total += left @ _gram(right, right, scale) @ left.T
             for other, columns in parts[:i]:

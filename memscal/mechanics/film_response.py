@@ -27,8 +27,8 @@ base.  With :math:`\kappa = 3 - 4\nu`, :math:`c = \cosh x`, :math:`s = \sinh x`,
 
 which tend to those of the half-space, :math:`W = Y = 1` and :math:`X = -(1-2\nu)/2(1-\nu)`, for
 large :math:`x`; a ``correction`` is the difference, free of cancellation.  They are evaluated with
-decaying exponentials, so that nothing overflows, and by a series where the closed form would
-cancel.  All take ``x`` of any shape, from 0 to infinity, and Poisson's ratio from 0 to 0.5.
+decaying exponentials, so that nothing overflows, and by a Bessel function where the closed form
+would cancel.  All take ``x`` of any shape, from 0 to infinity, and Poisson's ratio from 0 to 0.5.
 (For :math:`W` and :math:`T` see also Frétigny and Chateauminois, J. Phys. D 40 (2007) 5418.)
 
 In space the half-space's share of the surface's compliance is in closed form
@@ -45,6 +45,7 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.special import ive
 
 from memscal.axisymmetry.hankel import bessel, gauss_between, gauss_panels
 from memscal.mechanics.surface import (
@@ -58,9 +59,6 @@ from memscal.model.film import ElasticFilm
 
 # exp(-2 * 340) is still a normal number; beyond, every response has long reached its limit.
 _LARGEST_X = 340.0
-# Below this x a difference is summed as a series, exact to rounding with these terms.
-_SERIES_BELOW = 0.5
-_TERMS = 9
 
 
 def half_space_coupling(nu: float) -> float:
@@ -91,7 +89,9 @@ def base_response(x: ArrayLike, nu: float, order: int = 0) -> ArrayPair:
     rising = 2 * (1 - nu) * (1 + decay)
     falling = np.expm1(-2 * x)
     if order:
-        by_pressure = (1 - 2 * nu) * _x_cosh_minus_sinh(x, decay) + 2 * nu * x * (1 + decay)
+        # 2 exp(-x) (x cosh x - sinh x), free of cancellation: a spherical Bessel function.
+        difference = np.sqrt(2 * np.pi) * x**1.5 * ive(1.5, x)
+        by_pressure = (1 - 2 * nu) * difference + 2 * nu * x * (1 + decay)
         by_shear = rising + x * falling
     else:
         by_pressure = rising - x * falling
@@ -105,15 +105,6 @@ def _prepare(x: ArrayLike, nu: float) -> tuple[FloatArray, FloatArray, FloatArra
     kappa = 3 - 4 * nu
     decay = np.exp(-2 * x)
     return x, decay, kappa * (1 + decay**2) + decay * (4 * x**2 + kappa**2 + 1), kappa
-
-
-def _x_cosh_minus_sinh(x: FloatArray, decay: FloatArray) -> FloatArray:
-    """Return 2 exp(-x) (x cosh x - sinh x); below some x by its power series."""
-    series = np.ones_like(x)
-    for j in range(_TERMS - 1, 0, -1):
-        series = 1 + x**2 / (2 * j * (2 * j + 3)) * series
-    series *= 2 / 3 * np.exp(-x) * x**3
-    return np.where(x < _SERIES_BELOW, series, x * (1 + decay) + np.expm1(-2 * x))
 
 
 # Depression by pressure and by shear, outward displacement by pressure and by shear.
@@ -169,7 +160,7 @@ class RingTraction:
     """Pressure and outward shear (Pa) linear between rings (m, from 0), zero beyond the last."""
 
     rings: FloatArray
-    pressures: FloatArray
+    pressures: FloatArray  # (n,), or (n, m) of several tractions
     shears: FloatArray
 
     @property
@@ -203,12 +194,13 @@ class RingTraction:
 
     def _transform(self, values: FloatArray, k: FloatArray, order: int) -> FloatArray:
         flat = np.ravel(floats(k))
-        transform = np.zeros_like(flat)
+        several = values.shape[1:]
+        transform = np.zeros((flat.size, *several))
         if np.any(values):
             for chunk in slices(flat.size, _CHUNK):
                 hats = hat_transform(self.rings.tobytes(), flat[chunk].tobytes(), order)
                 transform[chunk] = hats @ values
-        return transform.reshape(np.shape(k))
+        return transform.reshape(np.shape(k) + several)
 
 
 #: Wavenumbers that are treated together: bounds the memory.
@@ -242,14 +234,9 @@ class HankelFilm:
     @cached_property
     def compliance(self) -> SurfaceCompliance:
         """Displacements of the rings under tractions on the rings."""
-        r = self.r
-        direct = singular_integrals(r, r)
-        across = coupling_integrals(r, r)
-        k, weights = _wavenumbers(self.film, 2 * r[-1])
-        normal, radial = (hat_transform(r.tobytes(), k.tobytes(), order) for order in (0, 1))
-        half_space = (direct[0], *across, direct[1])
-        moved = _displacements(self.film, r, k, weights, normal, radial, half_space)
-        return SurfaceCompliance(r, np.block([[*moved[:2]], [*moved[2:]]]))
+        unit = np.eye(self.r.size)
+        moved = self.field(unit, unit).displacements(self.r)
+        return SurfaceCompliance(self.r, np.block([[*moved[:2]], [*moved[2:]]]))
 
     discretisation = "Hankel transforms, Gauss-Legendre in k"
 
@@ -295,14 +282,28 @@ class HankelField:
 
     def surface(self, r: FloatArray, order: int) -> FloatArray:
         """Return depression or outward displacement of the surface in m."""
-        x = np.ravel(r)
+        by_pressure, by_shear = self.displacements(np.ravel(r))[2 * order : 2 * order + 2]
+        return (by_pressure + by_shear).reshape(np.shape(r))
+
+    def displacements(self, x: FloatArray) -> HalfSpaceIntegrals:
+        """Return depression by pressure and by shear, then outward displacement, at ``x`` (m)."""
+        film = self.film
         traction = self.traction
-        k, weights = _wavenumbers(self.film, x.max(initial=0.0) + traction.radius)
+        nu = film.poisson_ratio
+        scale = (1 - nu) / film.shear_modulus
+        beta = half_space_coupling(nu)
+        k, weights = _wavenumbers(film, x.max(initial=0.0) + traction.radius)
         p = traction.pressure_transform(k)
         q = traction.shear_transform(k)
-        displaced = _displacements(self.film, x, k, weights, p, q, traction.half_space_integrals(x))
-        by_pressure, by_shear = displaced[2 * order : 2 * order + 2]
-        return (by_pressure + by_shear).reshape(np.shape(r))
+        half_space = traction.half_space_integrals(x)
+        by_normal, coupling, by_radial = corrections(k * film.thickness, nu)
+        normal, radial = (bessel(order, np.outer(x, k)) * weights for order in (0, 1))
+        return (
+            scale * (half_space[0] + (normal * by_normal) @ p),
+            scale * (beta * half_space[1] + (normal * coupling) @ q),
+            scale * (beta * half_space[2] + (radial * coupling) @ p),
+            scale * (half_space[3] + (radial * by_radial) @ q),
+        )
 
 
 def _wavenumbers(film: ElasticFilm, reach: float) -> ArrayPair:
@@ -310,26 +311,3 @@ def _wavenumbers(film: ElasticFilm, reach: float) -> ArrayPair:
     # 1.5/h keeps the panels short beside the distance of the transfer functions' poles.
     h = film.thickness
     return gauss_panels(_LARGEST_KH / h, min(1.5 / h, _PHASE / max(reach, h)))
-
-
-def _displacements(
-    film: ElasticFilm,
-    x: FloatArray,
-    k: FloatArray,
-    weights: FloatArray,
-    p: FloatArray,  # transforms of pressure and shear, at the wavenumbers
-    q: FloatArray,
-    half_space: HalfSpaceIntegrals,
-) -> HalfSpaceIntegrals:
-    """Return the depression at ``x`` by p and by q, and the outward displacement by p and by q."""
-    nu = film.poisson_ratio
-    scale = (1 - nu) / film.shear_modulus
-    beta = half_space_coupling(nu)
-    by_normal, coupling, by_radial = corrections(k * film.thickness, nu)
-    normal, radial = (bessel(order, np.outer(x, k)) * weights for order in (0, 1))
-    return (
-        scale * (half_space[0] + (normal * by_normal) @ p),
-        scale * (beta * half_space[1] + (normal * coupling) @ q),
-        scale * (beta * half_space[2] + (radial * coupling) @ p),
-        scale * (half_space[3] + (radial * by_radial) @ q),
-    )

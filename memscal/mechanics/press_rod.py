@@ -4,6 +4,8 @@ import math
 from dataclasses import replace
 from functools import lru_cache
 
+import numpy as np
+
 from memscal.errors import ConvergenceError, DomainError
 from memscal.mechanics.contact import Contact
 from memscal.mechanics.tabulated_rod import (
@@ -71,7 +73,7 @@ def _midway(film: ElasticFilm, rod: Rod, load: float) -> Contact:
     for order in (0, 1):
         own, more, less = (c.inside.spectrum(k, order) for c in (sticks, *ends))
         transforms.append(own - half * (more - less))
-    field = TabulatedField(k, (transforms[0], transforms[1]), rod.radius)
+    field = TabulatedField(k, np.array(transforms), rod.radius)
     middle = f"{sticks.discretisation}, midway between sticking and sliding"
     return replace(sticks, inside=field, friction=math.nan, discretisation=middle)
 

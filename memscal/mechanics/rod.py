@@ -25,7 +25,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.polynomial import legendre
 
-from memscal.axisymmetry.hankel import gauss_panels
+from memscal.axisymmetry.hankel import gauss_panels, quotient
 from memscal.errors import ConvergenceError, DomainError
 from memscal.mechanics.film_response import (
     HalfSpaceIntegrals,
@@ -141,15 +141,14 @@ class RodTraction:
         pressed = legendre.legval(t, even)
         sheared = legendre.legval(t, odd)
         w_by_p = np.sum(d_theta * pressed, axis=1)
-        inverse = np.divide(1.0, rho, out=np.zeros_like(rho), where=rho > 0)
+        inverse = quotient(1.0, rho)
         u_by_q = np.sum(d_theta * t * sheared, axis=1) * inverse
 
         # t^2 = rho^2 + s^2 beyond: the root sqrt(t^2 - rho^2) = s cancels against dt = s ds / t.
         top = np.sqrt(np.maximum(1 - rho**2, 0.0))
         t = np.sqrt(inner[:, None] ** 2 + (top[:, None] * share) ** 2)
         d_s = top[:, None] * weights
-        reciprocal = np.divide(1.0, t, out=np.zeros_like(t), where=t > 0)
-        w_by_q = np.sum(d_s * legendre.legval(t, odd) * reciprocal, axis=1)
+        w_by_q = np.sum(d_s * legendre.legval(t, odd) * quotient(1.0, t), axis=1)
         beyond = np.sum(d_s * legendre.legval(t, even), axis=1)
         u_by_p = (legendre.legval(1.0, legendre.legint(even, lbnd=0)) - beyond) * inverse
         unit = self.load / (2 * np.pi * self.radius)

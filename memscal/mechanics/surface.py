@@ -25,7 +25,7 @@ from typing import Protocol
 import numpy as np
 from scipy.special import ellipe, ellipkm1
 
-from memscal.axisymmetry.hankel import gauss_panels
+from memscal.axisymmetry.hankel import gauss_panels, quotient
 from memscal.model.arrays import ArrayPair, BoolArray, FloatArray, IndexArray, array_record
 
 
@@ -116,7 +116,7 @@ def coupling_integrals(x: FloatArray, rings: FloatArray) -> ArrayPair:
     beyond = on_hats(lengths * (0.5 - falling), lengths * (0.5 - rising))
     left = lengths * (starts * falling + lengths * (rising - reach**3 / 3))
     within = on_hats(left, lengths * (starts * rising + lengths * reach**3 / 3))
-    return beyond, within * np.where(x > 0, 1 / np.where(x > 0, x, 1.0), 0.0)[:, None]
+    return beyond, quotient(within, x[:, None])
 
 
 def on_hats(left: FloatArray, right: FloatArray) -> FloatArray:

@@ -18,7 +18,7 @@ import numpy as np
 from memscal.axisymmetry.hankel import Wavenumbers, up_to
 from memscal.errors import InputError
 from memscal.mechanics.contact import Contact
-from memscal.model.arrays import ArrayPair, Arrays, FloatArray, array_record
+from memscal.model.arrays import Arrays, FloatArray, array_record
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Rod
 
@@ -35,7 +35,7 @@ class TabulatedField:
     """Base stress of a rod by its transforms (N) at wavenumbers (rad/m), and nothing else."""
 
     k: FloatArray
-    transforms: ArrayPair  # of the normal stress, and of order one of the shear
+    transforms: FloatArray  # (2, k): of the normal stress, and of order one of the shear
     radius: float
 
     def spectrum(self, k: FloatArray, order: int) -> FloatArray:
@@ -71,8 +71,8 @@ def tabulated_rod(film: ElasticFilm, rod: Rod, load: float, *, sticking: bool) -
     rows, deepest = column
     scale = film.shear_modulus * film.thickness**2
     depth = brentq(lambda d: _load(rows, d) - load / scale, 0.0, deepest, xtol=1e-12)
-    normal, shear = rows(np.cbrt(depth))[1:].reshape(2, -1) * load
-    inside: Any = TabulatedField(base_wavenumbers(film), (normal, shear), rod.radius)
+    transforms = rows(np.cbrt(depth))[1:].reshape(2, -1) * load
+    inside = TabulatedField(base_wavenumbers(film), transforms, rod.radius)
     loads = _load(rows, _STEPS * depth) * scale
     work = float(np.trapezoid(loads, _STEPS * depth * film.thickness))
     return Contact(

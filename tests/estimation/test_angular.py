@@ -17,6 +17,7 @@ from memscal.estimation.plane import PlaneDepartures, Spots
 from memscal.estimation.points import measured_points
 
 RADII = np.array([0.3e-3, 0.8e-3])
+ONES = np.ones(2)
 ONE_EACH = np.eye(4 * len(ORDERS))
 
 
@@ -24,7 +25,7 @@ def test_kernels_are_blurred_rings_of_their_order():
     blur = 0.25e-3
     axis = np.arange(-30, 31) * 0.1e-3
     x, y = (a.ravel() for a in np.meshgrid(axis, axis))
-    departures = AngularDepartures(AngularRings(RADII, blur), ONE_EACH)
+    departures = AngularDepartures(AngularRings(RADII, blur * ONES, ONES), ONE_EACH)
     kernels = departures.at(axis, axis, np.eye(departures.count))
     angle = np.linspace(0, 2 * np.pi, 400, endpoint=False)
     # A ring is many Gaussians around it, their heights cos and sin of m times the angle.
@@ -44,7 +45,7 @@ SPOTS = Spots(np.arange(-1, 2) * 0.7e-3, ~np.eye(3, k=2, dtype=bool), 0.4e-3, np
 @pytest.mark.parametrize(
     "departures",
     [
-        AngularDepartures(AngularRings(RADII, 0.3e-3), ONE_EACH),
+        AngularDepartures(AngularRings(RADII, 0.3e-3 * ONES, ONES), ONE_EACH),
         PlaneDepartures(SPOTS, np.eye(8)[:, 2:7]),
     ],
 )

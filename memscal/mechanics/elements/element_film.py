@@ -65,11 +65,11 @@ class QuarticLine:
         return csr_array((quartics.ravel(), columns.ravel(), rows), shape=(r.size, self.r.size))
 
     @cached_property
-    def mass(self) -> csr_array:
+    def mass(self) -> csc_array:
         r"""Matrix :math:`\int N_i N_j\,r\,dr`."""
         nodes, weights = gauss_between(self.corners, _ORDER)
         values = self.at(nodes)
-        return csr_array(values.T @ values.multiply((weights * nodes)[:, None]))
+        return csc_array(values.T @ values.multiply((weights * nodes)[:, None]))
 
     def loads_of_hats(self, rings: FloatArray) -> csr_array:
         r"""Return :math:`\int N_i \phi_j\,r\,dr` of the rings' hats, exactly."""
@@ -186,8 +186,8 @@ class MixedSystem:
         return splu(csc_array(self.matrix[self.free][:, self.free]))
 
     def solve(self, unknowns: IndexArray, loads: FloatArray) -> FloatArray:
-        """Return all unknowns, shape (all, n), under loads, shape (unknowns.size, n), on some."""
-        right = np.zeros((self.matrix.shape[0], loads.shape[1]))
+        """Return all unknowns, (all,) or (all, n), under loads, (m,) or (m, n), on m of them."""
+        right = np.zeros((self.matrix.shape[0], *loads.shape[1:]))
         right[unknowns] = loads
         right[self.free] = self._factors.solve(right[self.free])
         right[self._held] = 0.0
@@ -206,50 +206,6 @@ _QUARTERS = np.array(
 )
 
 
-def field_mesh(system: MixedSystem, solution: FloatArray, film: ElasticFilm) -> FieldMesh:
-    """Return displacement and stress at all nodes; the strain is the mean over triangles there."""
-    import skfem
-
-    # Outward and inward unknowns of the 15 nodes of each triangle, in the element's own order.
-    dofs = system.displacement.element_dofs
-    local = skfem.ElementTriP4.doflocs
-    outward = dofs[0::2]
-    inward = dofs[1::2]
-    nodes, index = np.unique(inward, return_inverse=True)
-    index = index.reshape(inward.shape)
-    # The displacement's gradient and the mean pressure at the nodes of every triangle.
-    basis = system.displacement
-    rule = (local.T, np.ones(len(local)))
-    at_nodes = skfem.Basis(basis.mesh, basis.elem, quadrature=rule)
-    moved, pressed = np.split(solution, [basis.N])
-    gradient = at_nodes.interpolate(moved).grad
-    squeeze = np.asarray(at_nodes.with_element(skfem.ElementTriP3()).interpolate(pressed))
-    r, depth = system.displacement.doflocs[:, nodes]
-    displacement = np.empty((nodes.size, 2))
-    displacement[index, 0] = solution[outward]
-    displacement[index, 1] = -solution[inward]
-
-    def averaged(values: FloatArray) -> FloatArray:
-        return np.bincount(index.ravel(), values.T.ravel()) / np.bincount(index.ravel())
-
-    radial = averaged(gradient[0][0])
-    vertical = averaged(gradient[1][1])
-    hoop = np.where(r > 0, displacement[:, 0] / np.where(r > 0, r, 1.0), radial)
-    slip = averaged(gradient[0][1] + gradient[1][0])
-    mean = averaged(squeeze)
-    volume = (radial + vertical + hoop) / 3
-    stress = [2 * (strain - volume) - mean for strain in (radial, vertical, hoop)]
-    points = film.thickness * np.column_stack([r, 1 - depth])
-    return FieldMesh(
-        points=points,
-        triangles=anticlockwise(points, np.concatenate(np.moveaxis(index[_QUARTERS], 2, 1))),
-        displacement=film.thickness * displacement,
-        stress=film.shear_modulus * np.column_stack([*stress, -slip]),
-        notes=f"Linear elastic film, E = {film.young_modulus:g} Pa, nu = {film.poisson_ratio:g}, "
-        f"thickness {film.thickness * 1e3:g} mm, bonded at z = 0. Stress positive in tension.",
-    )
-
-
 # Tractions solved together: bounds the memory.
 _BATCH = 128
 # Radii between two nodes of the base at which its stress is tabulated for its spectrum.
@@ -262,8 +218,7 @@ class ElementFilm:
 
     film: ElasticFilm
     r: FloatArray
-    radius: float = 25e-3
-    refinement: int = 1  # how many times shorter than by default the sides of the triangles are
+    radius: float
 
     def __post_init__(self) -> None:
         if self.r[-1] > self.radius:
@@ -277,31 +232,20 @@ class ElementFilm:
     def system(self) -> MixedSystem:
         """The finite-element equations, in film thicknesses and shear moduli."""
         rings = self.r / self.film.thickness
-        radius = self.radius / self.film.thickness
-        mesh = film_triangles(rings, radius=radius, refinement=self.refinement)
+        mesh = film_triangles(rings, radius=self.radius / self.film.thickness)
         return MixedSystem(mesh, self.film.poisson_ratio)
 
     @cached_property
     def compliance(self) -> SurfaceCompliance:
         """Displacements of the rings under tractions on the rings."""
-        system = self.system
-        rings = self.r / self.film.thickness
-        line, outward, inward = system.side(0.0)
-        hats = line.loads_of_hats(rings).tocsc()
-        seen = line.at(rings)
-        scale = self.film.thickness / self.film.shear_modulus
-        # Direction and ring that moves by direction and ring of the traction.
-        moved = np.empty((2, rings.size, 2, rings.size))
-        task = Task("tractions", 2 * rings.size)
-        done = 0
-        for source, unknowns in enumerate((inward, outward)):
-            for batch in slices(rings.size, _BATCH):
-                solution = system.solve(unknowns, hats[:, batch].toarray())
-                moved[0, :, source, batch] = scale * (seen @ solution[inward])
-                moved[1, :, source, batch] = scale * (seen @ solution[outward])
-                done += rings[batch].size
-                task.tell(done)
-        return SurfaceCompliance(self.r, np.reshape(moved, (2 * rings.size, -1)))
+        unit = np.eye(2 * self.r.size)
+        moved = np.empty_like(unit)
+        task = Task("tractions", len(unit))
+        for batch in slices(len(unit), _BATCH):
+            field = self.field(*np.split(unit[:, batch], 2))
+            moved[:, batch] = np.vstack([field.surface(self.r, order) for order in (0, 1)])
+            task.tell(batch.stop)
+        return SurfaceCompliance(self.r, moved)
 
     @property
     def discretisation(self) -> str:
@@ -313,13 +257,13 @@ class ElementFilm:
         )
 
     def field(self, pressure: FloatArray, shear: FloatArray) -> ElementField:
-        """Return the field under ``pressure`` and ``shear`` (Pa) at the rings, shapes (n,)."""
+        """Return the field under ``pressure`` and ``shear`` (Pa) at the rings, (n,) or (n, m)."""
         line, outward, inward = self.system.side(0.0)
         hats = line.loads_of_hats(self.r / self.film.thickness)
         modulus = self.film.shear_modulus
-        loads = np.append(hats @ (pressure / modulus), hats @ (shear / modulus))
-        solution = self.system.solve(np.append(inward, outward), loads[:, None])
-        return ElementField(self.film, self.radius, self.system, solution[:, 0])
+        loads = np.concatenate([hats @ (pressure / modulus), hats @ (shear / modulus)])
+        solution = self.system.solve(np.append(inward, outward), loads)
+        return ElementField(self.film, self.radius, self.system, solution)
 
 
 @array_record
@@ -332,8 +276,49 @@ class ElementField:
     solution: FloatArray  # displacements in film thicknesses, mean pressures in shear moduli
 
     def mesh(self) -> FieldMesh:
-        """Return displacement and stress inside the film, on quadratic triangles."""
-        return field_mesh(self.system, self.solution, self.film)
+        """Return displacement and stress at all nodes, the strain as the mean over triangles."""
+        import skfem
+
+        film = self.film
+        basis = self.system.displacement
+        # Outward and inward unknowns of the 15 nodes of each triangle, in the element's own order.
+        dofs = basis.element_dofs
+        local = skfem.ElementTriP4.doflocs
+        outward = dofs[0::2]
+        inward = dofs[1::2]
+        nodes, index = np.unique(inward, return_inverse=True)
+        index = index.reshape(inward.shape)
+        # The displacement's gradient and the mean pressure at the nodes of every triangle.
+        rule = (local.T, np.ones(len(local)))
+        at_nodes = skfem.Basis(basis.mesh, basis.elem, quadrature=rule)
+        moved, pressed = np.split(self.solution, [basis.N])
+        gradient = at_nodes.interpolate(moved).grad
+        squeeze = np.asarray(at_nodes.with_element(skfem.ElementTriP3()).interpolate(pressed))
+        r, depth = basis.doflocs[:, nodes]
+        displacement = np.empty((nodes.size, 2))
+        displacement[index, 0] = self.solution[outward]
+        displacement[index, 1] = -self.solution[inward]
+
+        def averaged(values: FloatArray) -> FloatArray:
+            return np.bincount(index.ravel(), values.T.ravel()) / np.bincount(index.ravel())
+
+        radial = averaged(gradient[0][0])
+        vertical = averaged(gradient[1][1])
+        hoop = np.divide(displacement[:, 0], r, out=radial.copy(), where=r > 0)
+        slip = averaged(gradient[0][1] + gradient[1][0])
+        mean = averaged(squeeze)
+        volume = (radial + vertical + hoop) / 3
+        stress = [2 * (strain - volume) - mean for strain in (radial, vertical, hoop)]
+        points = film.thickness * np.column_stack([r, 1 - depth])
+        return FieldMesh(
+            points=points,
+            triangles=anticlockwise(points, np.concatenate(np.moveaxis(index[_QUARTERS], 2, 1))),
+            displacement=film.thickness * displacement,
+            stress=film.shear_modulus * np.column_stack([*stress, -slip]),
+            notes=f"Linear elastic film, E = {film.young_modulus:g} Pa, "
+            f"nu = {film.poisson_ratio:g}, thickness {film.thickness * 1e3:g} mm, "
+            "bonded at z = 0. Stress positive in tension.",
+        )
 
     def spectrum(self, k: FloatArray, order: int) -> FloatArray:
         """Return the transform of normal stress or traction at ``k`` (rad/m), in N."""
@@ -350,7 +335,7 @@ class ElementField:
         line, outward, inward = self.system.side(1.0)
         forces = self.system.matrix[np.append(inward, outward)] @ self.solution
         pushed, held = forces.reshape(2, -1) * self.film.shear_modulus
-        mass = csc_array(line.mass)
+        mass = line.mass
         # On the axis there is no shear.
         shear = np.append(0.0, spsolve(mass[1:, 1:], held[1:]))
         return smooth(line, -spsolve(mass, pushed), 1), smooth(line, shear, -1)
@@ -370,4 +355,4 @@ class ElementField:
             )
         line, outward, inward = self.system.side(0.0)
         values = line.at(flat / self.film.thickness) @ self.solution[outward if order else inward]
-        return (self.film.thickness * values).reshape(np.shape(r))
+        return self.film.thickness * values.reshape(np.shape(r) + values.shape[1:])

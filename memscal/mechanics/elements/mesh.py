@@ -7,22 +7,22 @@ and there are more of them.
 """
 
 from collections.abc import Callable
+from functools import partial
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
-from memscal.model.arrays import BoolArray, FloatArray, IndexArray, array_record, value_record
+from memscal.model.arrays import ArrayFunction, BoolArray, FloatArray, IndexArray, array_record
 
-# Intervals between rings that one side of a triangle spans.  A quartic has four, but with two the
+# One side of a triangle spans two intervals between rings.  A quartic has four, but with two the
 # shear of a sticking contact needs a quarter of the rings, for 1.4 times the time.
-_INTERVALS = 2
-# ... and one only at the last rings, so many of them, where a rod's pressure is singular, ...
+# It spans one at the last rings, so many of them, where a rod's pressure is singular, ...
 _AT_THE_EDGE = 4
 # ... and at an edge within the rings, where they are closer than this share of the outermost gap:
 # the shear of a contact that sticks at once is singular there.
 _NARROW = 0.25
-# ... where the widest of them is at most so many times the narrowest.
+# Two are joined where the wider one is at most so many times the narrower one.
 _UNEVEN = 2.1
 # Widest side at distances from the contact, all in film thicknesses: the field decays ...
 _DISTANCES = (1.0, 5.0, 9.0)
@@ -34,7 +34,9 @@ _GROWTH = 0.6
 _SLOPE = 1.0
 # A node goes down with the row if no other would come less deep by this share of its step.
 _TOGETHER = 0.8
-# So many steps from the base, a node goes on in even steps.
+# A step down is no longer, and ...
+_TALLEST = 0.5
+# ... so many steps from the base, a node goes on in even steps.
 _EVEN_STEPS = 3
 # A dropped node stays at least this share of the bridging side above it.
 _ROOM = 0.2
@@ -48,32 +50,22 @@ class TriangleMesh:
     triangles: IndexArray
 
 
-def film_triangles(rings: FloatArray, *, radius: float, refinement: int = 1) -> TriangleMesh:
+def film_triangles(rings: FloatArray, *, radius: float) -> TriangleMesh:
     """Return a mesh from the axis to the free edge; all lengths in thicknesses of the film."""
-    sizes = _Sizes(rings[-1], refinement)
+    widest = partial(_widest, rings[-1])
     # Corners of triangles on the surface: some of the rings, and others beyond.
-    inside = _fitted(rings, sizes)
-    growth = 1 + _GROWTH / refinement
-    beyond = graded(rings[-1], radius, rings[-1] - inside[-2], growth, sizes.widest)
-    front = _Front(np.append(inside, beyond[1:]), sizes)
+    inside = _fitted(rings)
+    beyond = graded(rings[-1], radius, rings[-1] - inside[-2], 1 + _GROWTH, widest)
+    front = _Front(np.append(inside, beyond[1:]), widest)
     while np.any(front.depth < 1.0):
         front.advance()
     return TriangleMesh(np.array(front.points), np.array(front.triangles, np.int64))
 
 
-@value_record
-class _Sizes:
-    """How long a side of a triangle may be."""
-
-    contact: float
-    refinement: int
-
-    def widest(self, r: FloatArray | float) -> FloatArray:
-        """Return the longest side allowed at ``r``."""
-        away = r - self.contact
-        widest = np.interp(away, _DISTANCES, _WIDEST)
-        widest += _WIDENING * np.maximum(away - _DISTANCES[-1], 0.0)
-        return widest / self.refinement
+def _widest(contact: float, r: Any) -> Any:
+    """Return the longest side of a triangle that is allowed at ``r``."""
+    away = r - contact
+    return np.interp(away, _DISTANCES, _WIDEST) + _WIDENING * np.maximum(away - _DISTANCES[-1], 0.0)
 
 
 def graded(
@@ -87,23 +79,20 @@ def graded(
     return np.array(nodes)
 
 
-def _fitted(rings: FloatArray, sizes: _Sizes) -> FloatArray:
+def _fitted(rings: FloatArray) -> FloatArray:
     """Return corners from the axis to the last ring, from that ring inward."""
     gaps = np.diff(rings)
     corners = [rings[-1]]
     last = gaps.size
     while last > 0:
         single = gaps.size - last < _AT_THE_EDGE or gaps[last - 1] < _NARROW * gaps[-1]
-        span = 1 if single else max(1, _INTERVALS // sizes.refinement)
         first = last - 1
-        longest = sizes.widest(rings[last])
-        while first > 0 and last - first < span:
+        longest = _widest(rings[-1], rings[last])
+        if first > 0 and not single:
             group = gaps[first - 1 : last]
-            if group.sum() > longest or group.max() > _UNEVEN * group.min():
-                break
-            first -= 1
-        fewest = sizes.refinement * (last - first) / _INTERVALS
-        pieces = int(np.ceil(max(gaps[first:last].sum() / longest, fewest)))
+            if group.sum() <= longest and group.max() <= _UNEVEN * group.min():
+                first -= 1
+        pieces = int(np.ceil(gaps[first:last].sum() / longest))
         corners.extend(np.linspace(rings[last], rings[first], pieces + 1)[1:])
         last = first
     return np.array(corners[::-1])
@@ -112,8 +101,8 @@ def _fitted(rings: FloatArray, sizes: _Sizes) -> FloatArray:
 class _Front:
     """The lowest row of nodes so far, as it advances to the base."""
 
-    def __init__(self, r: FloatArray, sizes: _Sizes) -> None:
-        self.sizes = sizes
+    def __init__(self, r: FloatArray, widest: ArrayFunction) -> None:
+        self.widest = widest
         self.r = r
         self.depth = np.zeros_like(r)
         self.node = np.arange(r.size)
@@ -141,8 +130,7 @@ class _Front:
         """Return the depth to which each node would go; the last steps to the base are even."""
         sides = np.pad((self.r[2:] - self.r[:-2]) / 2, 1, mode="edge")
         left = 1.0 - self.depth
-        tallest = 1.0 / (2 * self.sizes.refinement)
-        step = np.minimum(sides, np.minimum(self.sizes.widest(self.r), tallest))
+        step = np.minimum(sides, np.minimum(self.widest(self.r), _TALLEST))
         count = np.round(np.maximum(left / step, 1.0))
         depth = self.depth + np.where(count <= _EVEN_STEPS, left / count, step)
         return np.where(count == 1, 1.0, depth)
@@ -151,8 +139,7 @@ class _Front:
         """Return which nodes the next row has: never do two neighbours drop out."""
         r = self.r
         width = np.pad(r[2:] - r[:-2], 1)
-        slope = _SLOPE / self.sizes.refinement
-        longest = np.minimum(slope * lower, 1.001 * self.sizes.widest(r))
+        longest = np.minimum(_SLOPE * lower, 1.001 * self.widest(r))
         # The side that bridges a dropped node must pass well below it.
         share = (r[1:-1] - r[:-2]) / np.maximum(width[1:-1], r[-1] * 1e-300)
         room = np.pad((1 - share) * lower[:-2] + share * lower[2:] - self.depth[1:-1], 1)
@@ -179,6 +166,4 @@ class _Front:
             self.triangles.extend(triangle for triangle in corners if len(set(triangle)) == 3)
 
     def _length(self, start: int, end: int) -> float:
-        r1, d1 = self.points[start]
-        r2, d2 = self.points[end]
-        return float(np.hypot(r1 - r2, d1 - d2))
+        return float(np.hypot(*np.subtract(self.points[start], self.points[end])))

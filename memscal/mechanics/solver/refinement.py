@@ -34,6 +34,8 @@ _PLACING_SAMPLES = 100_001
 
 def _rings(request: RingRequest, edges: Sequence[float], reach: float, count: int) -> FloatArray:
     """Return ``count`` even rings up to ``reach`` (m), and more at the expected ``edges`` (m)."""
+    from scipy.integrate import cumulative_trapezoid
+
     if isinstance(request.indenter, Rod):
         # They crowd towards the edge; the last is on it.
         return request.indenter.radius * (1.0 - np.linspace(1.0, 0.0, count) ** _CROWDING)
@@ -43,7 +45,7 @@ def _rings(request: RingRequest, edges: Sequence[float], reach: float, count: in
     distance = r - near[np.searchsorted((near[1:] + near[:-1]) / 2, r)]
     # Where the number of rings passed so far is whole, there is one.
     density = 1 / np.minimum(spacing, np.hypot(_FINEST * spacing, _GROWTH * distance))
-    passed = np.append(0.0, np.cumsum(np.diff(r) / 2 * (density[1:] + density[:-1])))
+    passed = cumulative_trapezoid(density, r, initial=0)
     return np.interp(np.arange(math.floor(passed[-1]) + 1), passed, r)
 
 
@@ -235,9 +237,10 @@ def _contact_radius(request: RingRequest, rings: FloatArray, state: ContactState
     p = state.pressure
     if request.interface.normal_law:
         # Without an edge: where the pressure has fallen to a small share of its largest.
-        last = np.flatnonzero(p > _EDGE * p.max())[-1]
-        share = (p[last] - _EDGE * p.max()) / (p[last] - p[last + 1])
-        return float(rings[last] + share * (rings[last + 1] - rings[last]))
+        edge = _EDGE * p.max()
+        last = np.flatnonzero(p > edge)[-1]
+        around = slice(last, last + 2)
+        return float(np.interp(-edge, -p[around], rings[around]))
     last = np.flatnonzero(p > 0)[-1]
     if last == 0:
         return float(rings[1]) / 2

@@ -242,9 +242,8 @@ def take_step(
     if law:
         separation = problem.separations(start)
         pressing = _bearing(problem, law, separation)
-    held = goal.ring if isinstance(goal, Touch) else None
-    if held is not None:
-        pressing[held] = False
+    held = np.arange(pressing.size) == (goal.ring if isinstance(goal, Touch) else -1)
+    pressing[held] = False
     stretch = start.outward - start.anchor
     status = _Status(pressing, start.slip, start.anchor, separation, start.pressure, stretch)
     for iteration in range(1, _MOST_ITERATIONS + 1):
@@ -269,9 +268,8 @@ def take_step(
     # What slips drags its anchor along, a slip length behind; what is free has none.
     moving = ~status.pressing | (slip != 0)
     anchor = np.where(moving, u + slip * problem.interface.slip_length, status.anchor)
-    touching = status.pressing | (np.arange(p.size) == held)
     load = float(problem.compliance.areas @ p)
-    return ContactState(p, q, depth, load, touching, slip, anchor, u)
+    return ContactState(p, q, depth, load, status.pressing | held, slip, anchor, u)
 
 
 def _bearing(problem: ContactProblem, law: NormalLaw, separation: FloatArray) -> BoolArray:
@@ -281,7 +279,7 @@ def _bearing(problem: ContactProblem, law: NormalLaw, separation: FloatArray) ->
 
 
 def _revise(
-    problem: ContactProblem, status: _Status, trial: _Trial, held: int | None, careful: bool
+    problem: ContactProblem, status: _Status, trial: _Trial, held: BoolArray, careful: bool
 ) -> tuple[_Status, bool]:
     """Return a status that the trial does not contradict, and whether nothing changed."""
     p = trial.pressure
@@ -294,8 +292,7 @@ def _revise(
         pull = -p / abs(p).max(initial=1e-300)
         overlap = -separation / max(abs(trial.depth), 1e-300)
         wrong = np.where(status.pressing, pull, overlap)
-        if held is not None:
-            wrong[held] = 0.0
+        wrong[held] = 0.0
         pressing = status.pressing ^ _changing(wrong, careful)
         settled &= np.array_equal(pressing, status.pressing)
     else:
@@ -307,11 +304,10 @@ def _revise(
         borne = law.separation(np.where(closing, p, 1.0), problem.film)
         separation = np.where(closing, np.clip(borne, separation, before), parting)
         pressing = _bearing(problem, law, separation)
-    stretch = status.stretch
     if not problem.interface.rigid:
         settled &= abs(p - status.pressure).max() <= _SETTLED * p.max()
-        length = problem.interface.slip_length
-        stretch = np.clip(trial.outward - status.anchor, -length, length)
+    length = problem.interface.slip_length
+    stretch = np.clip(trial.outward - status.anchor, -length, length)
     return _Status(pressing, slip, status.anchor, separation, p, stretch), settled
 
 

@@ -15,7 +15,7 @@ H = 2e-3
 def solved(nu):
     r = np.linspace(0, H, 81)
     pressure = 1e5 * (1 - (r / H) ** 2) ** 2
-    field = ElementFilm(film(nu), r).field(pressure, 0.2 * pressure * r / H)
+    field = ElementFilm(film(nu), r, radius=25e-3).field(pressure, 0.2 * pressure * r / H)
     return field, field.mesh(), r, pressure
 
 
