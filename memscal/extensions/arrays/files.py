@@ -118,9 +118,9 @@ def read_open(file: SafeFile) -> ArrayData:
         "process": groups.read_process(file),
     }
     data = ArrayData(**{n: read[n] for n in read.keys() & ArrayData.__dataclass_fields__.keys()})
-    if len(data.pairs) != len(read["of_c"]):
-        raise FormatError(f"{file.name} states the crosstalk of other pairs than it estimated.")
     faults = list(_faults(data))
+    if [*map(len, data.split(data.columns)[3:])] != [len(read["of_c"]), len(read["changes"])]:
+        faults.append("roots are of other pairs or modes than there are")
     if faults:
         raise FormatError(
             f"{file.name} is of no calibration: {', '.join(faults)}.",

@@ -15,7 +15,7 @@ from memscal.extensions.arrays.locate import Touch, locate
 from memscal.extensions.arrays.single_sensor import single_sensor
 from memscal.extensions.arrays.stream import Stream
 from memscal.formats.hdf5.reader import open_hdf5
-from memscal.formats.hdf5.writer import ARTIFACT_SCHEMA, SCHEMA_ATTRIBUTE
+from memscal.formats.hdf5.writer import ARTIFACT_SCHEMA
 from memscal.model.arrays import FloatArray, keyword_array_record
 from memscal.model.provenance import SourceFile
 from memscal.model.result import Gridded, Shown
@@ -310,7 +310,7 @@ def load_array(path: str | PathLike[str], *, accept_altered: bool = False) -> Se
     True
     """
     with open_hdf5(path, accept_altered=accept_altered) as file:
-        if file.attribute("/", SCHEMA_ATTRIBUTE) == ARTIFACT_SCHEMA:
+        if file.schema == ARTIFACT_SCHEMA:
             raise FormatError(
                 f"{file.name} is the artifact of a single sensor, not of an array.",
                 why="An array's artifact has the sensors that were calibrated together.",

@@ -6,7 +6,6 @@ from memscal.errors import FormatError, InputError
 from memscal.extensions.recorded.columns import RecordedColumns
 from memscal.formats.files import FilePath
 from memscal.formats.hdf5.reader import SafeFile, open_hdf5
-from memscal.formats.hdf5.writer import SCHEMA_ATTRIBUTE
 from memscal.model.arrays import Values
 
 #: Groups that @default leads through: that of the file, of its entry, and of a part of it.
@@ -16,7 +15,7 @@ _MOST_DEFAULTS = 3
 def open_datasets(path: FilePath, named: Values, **reading: Any) -> RecordedColumns:
     """Read the datasets that are named; where x, y and u are not, signal and axis of the NXdata."""
     with open_hdf5(path) as file:
-        schema = file.attribute("/", SCHEMA_ATTRIBUTE)
+        schema = file.schema
         if schema is not None:
             raise InputError(
                 f"{file.name} is no table, but has the schema {schema!r}.",

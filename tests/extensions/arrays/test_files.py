@@ -99,7 +99,7 @@ def test_a_changed_file_is_refused_or_accepted_on_record(tmp_path):
         ("sensors/used", np.nan, "no sensor is used"),
         ("sensors/conversion_constant", -1e-7, "not finite and above zero"),
         ("sensors/conversion_constant", np.nan, "not finite and above zero"),
-        ("crosstalk/estimated", np.nan, "other pairs"),
+        ("crosstalk/estimated", np.nan, "roots are of other pairs"),
         ("crosstalk/c", np.nan, "crosstalk is not finite"),
         ("crosstalk/c", 2.0, "not 1 of a sensor with itself"),
         ("noise/correlation", 5.0, "no covariance"),
@@ -114,6 +114,19 @@ def test_an_altered_file_with_numbers_of_no_calibration_is_refused(path, value, 
         whole = path in ("sensors/used", "sensors/line_y", "crosstalk/estimated")
         altered[f"entry/{path}"][() if whole else (..., 0)] = value
     with pytest.raises(FormatError, match=words):
+        memscal.load_array(file, accept_altered=True)
+
+
+def test_a_mode_that_the_roots_lack_is_refused(tmp_path):
+    file = tmp_path / "array.h5"
+    full_array().save(file)
+    with h5py.File(file, "a") as altered:
+        short = altered["entry/roots/of_mode"][:-1]
+        attributes = dict(altered["entry/roots/of_mode"].attrs)
+        del altered["entry/roots/of_mode"]
+        altered["entry/roots/of_mode"] = short
+        altered["entry/roots/of_mode"].attrs.update(attributes)
+    with pytest.raises(FormatError, match="other pairs or modes"):
         memscal.load_array(file, accept_altered=True)
 
 
