@@ -23,6 +23,7 @@ from memscal.model.checks import (
     uncertainty_unstated_messages,
 )
 from memscal.model.scan import Scan
+from memscal.summaries.table import percent
 
 #: Crosstalk is identified where its median standard uncertainty is at most this.
 IDENTIFIED = 0.005
@@ -363,8 +364,8 @@ def array_messages(
         p_value = min(2 * min(chdtrc(places.size, square), by_mean), 1.0)
         yield Message(
             "crosstalk",
-            f"Crosstalk is {values.mean():.2%} on the mean (u {of_mean:.2%}); without any the "
-            f"probability of as much is p = {p_value:.2g}.",
+            f"Crosstalk is {percent(values.mean())} on the mean (u {percent(of_mean)}); without any "
+            f"the probability of as much is p = {p_value:.2g}.",
         )
     stated = prepared.scans[0]
     yield from uncertainty_unstated_messages(
