@@ -364,8 +364,8 @@ def array_messages(
         p_value = min(2 * min(chdtrc(places.size, square), by_mean), 1.0)
         yield Message(
             "crosstalk",
-            f"Crosstalk is {percent(values.mean())} on the mean (u {percent(of_mean)}); without any "
-            f"the probability of as much is p = {p_value:.2g}.",
+            f"Crosstalk is {percent(values.mean())} on the mean (u {percent(of_mean)}); without "
+            f"any the probability of as much is p = {p_value:.2g}.",
         )
     stated = prepared.scans[0]
     yield from uncertainty_unstated_messages(
