@@ -201,8 +201,9 @@ def _averaged_shapes(scan: Scan, start: ProfileEstimate) -> _PressureEstimate:
     kept = np.flatnonzero(weight >= _NEGLIGIBLE)
     fits = [_averaged_departures(start, weighed[i]) for i in kept]
     shares = weight[kept] / weight[kept].sum()
-    mean = shares @ np.stack([fit.state for fit in fits])
-    apart = np.stack([fit.state - mean for fit in fits], axis=1) * np.sqrt(shares)
+    states = np.stack([fit.state for fit in fits])
+    mean = shares @ states
+    apart = (states - mean).T * np.sqrt(shares)
     pairs = list(zip(shares, fits, strict=True))
     return _PressureEstimate(
         state=mean,
@@ -264,9 +265,8 @@ def fitted_shapes(shapes: Sequence[PressureShape], start: ProfileEstimate) -> li
     widths = np.where(settled, widths, width)
     columns = np.moveaxis(_shape_columns(shapes, start, forces, widths), 1, 0)
     background = start.model.drift_columns @ gaussian.drift
-    fits = []
-    for force, width, jacobian in zip(forces, widths, columns, strict=True):
-        fit = replace(
+    return [
+        replace(
             gaussian,
             conversion_constant=float(force),
             sigma=float(width),
@@ -274,8 +274,8 @@ def fitted_shapes(shapes: Sequence[PressureShape], start: ProfileEstimate) -> li
             jacobian=jacobian,
             predicted=force * jacobian[:, 0] + background,
         )
-        fits.append(fit)
-    return fits
+        for force, width, jacobian in zip(forces, widths, columns, strict=True)
+    ]
 
 
 def _shape_columns(
@@ -284,10 +284,9 @@ def _shape_columns(
     """Derivatives of the voltages by force, width, centre and drift, (n, shapes, p)."""
     model = start.model
     geometry = start.gaussian.geometry
-    kernels = np.zeros((model.k.size, len(shapes)))
-    slopes = np.zeros_like(kernels)
-    for i, (shape, width) in enumerate(zip(shapes, widths, strict=True)):
-        kernels[:, i], slopes[:, i] = shape.transform(model.k, width)
+    pairs = zip(shapes, widths, strict=True)
+    transforms = np.array([shape.transform(model.k, width) for shape, width in pairs])
+    kernels, slopes = transforms.transpose(1, 2, 0)
     signal, widening = np.hsplit(model.signal(geometry, np.hstack([kernels, slopes])), 2)
     centre = [model.centre_derivative(geometry, kernel) for kernel in (forces * kernels).T]
     drift = model.drift_columns[:, None]
@@ -414,13 +413,10 @@ def columns_of(changes: Arrays, names: Sequence[str], count: int) -> FloatArray:
 
 def _signals(estimate: ProfileEstimate, state: FloatArray, changes: FloatArray) -> FloatArray:
     """Voltages of the pressure through changed references, shape (n, q), in V."""
-    kernel = state[: estimate.model.k.size]
     model = estimate.model
-    columns = np.zeros((model.points.u.size, changes.shape[1]))
-    for i, change in enumerate(changes.T):
-        changed = replace(model, references=(RadialSpectrum(model.reference.wavenumbers, change),))
-        columns[:, i] = changed.signal(estimate.gaussian.geometry, kernel)
-    return columns
+    alone = RadialSpectrum(model.reference.wavenumbers, np.ones(model.k.size))
+    kernels = state[: model.k.size, None] * changes
+    return replace(model, references=(alone,)).signal(estimate.gaussian.geometry, kernels)
 
 
 def sensor_changes(
@@ -489,8 +485,8 @@ def alike_films(film: ElasticFilm, other: ElasticFilm) -> bool:
     # What is not stated is not a number.
     values = np.array([getattr(film, name) for name in names], float)
     others = np.array([getattr(other, name) for name in names], float)
-    same = np.isclose(values, others, rtol=1e-6, atol=0.0, equal_nan=True)
-    return film.name == other.name and bool(same.all())
+    same = np.allclose(values, others, rtol=1e-6, atol=0.0, equal_nan=True)
+    return film.name == other.name and same
 
 
 @lru_cache(maxsize=16)
@@ -525,10 +521,9 @@ def film_changes(set_up: SetUp, wavenumbers: Wavenumbers) -> Arrays:
     for name in ("thickness", "poisson_ratio"):
         ends = more_and_less(set_up.film, name)
         if ends:
-            more, less, share = ends
-            upper = film_transfer(set_up._replace(film=more), wavenumbers)
-            lower = film_transfer(set_up._replace(film=less), wavenumbers)
-            changes[name] = share * (upper - lower)
+            *films, share = ends
+            more, less = (film_transfer(set_up._replace(film=f), wavenumbers) for f in films)
+            changes[name] = share * (more - less)
     if law_at_once(set_up.under(NEO_HOOKEAN)) != LINEAR:
         linear = _linear_transfer(set_up, wavenumbers)
         for name, change in law_sensitivities(set_up, linear).items():
