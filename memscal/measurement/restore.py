@@ -107,7 +107,7 @@ def scan_at_load(scan: Scan, load: float) -> Scan:
     )
 
 
-def place_of(scan: Scan) -> str:
+def place_of(scan: Scan | MeasuredScan) -> str:
     """Name a scan's file, for messages."""
     return scan.source.file_name if scan.source else "The scan"
 
@@ -433,8 +433,9 @@ def restore(
     if isinstance(expected, str | PathLike):
         expected = read_reference(expected, accept_altered=accept_altered)
     require_measurement(measured, sensor)
-    sources = (sensor.source, measured.source, getattr(expected, "source", None))
-    overridden = accepted_alterations(*sources)
+    overridden = accepted_alterations(
+        sensor.source, measured.source, getattr(expected, "source", None)
+    )
     overridden += accept_mismatches(measured, sensor, override=override)
     restored = restore_known(measured, sensor, expected)
     return replace(restored, messages=(*override_messages(overridden), *restored.messages))
