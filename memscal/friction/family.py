@@ -49,9 +49,7 @@ _ROUNDING = 1e-9
 
 def bounded(values: ArrayLike, scale: float) -> FloatArray:
     """Return the bounded coordinate t of values: 1 where they are infinite."""
-    theta = floats(values)
-    finite = np.where(np.isinf(theta), 0.0, theta)
-    return np.where(np.isinf(theta), 1.0, finite / (finite + scale))
+    return floats(1 - scale / (floats(values) + scale))
 
 
 def unbounded(coordinates: ArrayLike, scale: float) -> FloatArray:
