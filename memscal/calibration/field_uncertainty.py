@@ -67,9 +67,8 @@ def field_errors(solution: Solution, effects: Effects, correlations: Correlation
         inputs = voltages.T @ square_root(correlation_matrix(list(effects), correlations))
     reach = np.inf if deconvolution.divided else fields.support + 4 * fields.step
     x, y = (_nodes(axis, estimate.gaussian.sigma, reach) for axis in fields.central.axes)
-    inside_y = np.clip(y, g.y[0], g.y[-1])
-    inside_x = np.clip(x, g.x[0], g.x[-1])
-    at_nodes = RectBivariateSpline(g.y, g.x, g.image)(inside_y, inside_x)
+    # Beyond its axes the spline keeps its last values.
+    at_nodes = RectBivariateSpline(g.y, g.x, g.image)(y, x)
     at_nodes[np.hypot.outer(y, x) >= fields.support] = 0.0
     variances_of = _division_variances if deconvolution.divided else _posterior_variances
     variances = variances_of(solution, (x, y), at_nodes.ravel(), inputs)
