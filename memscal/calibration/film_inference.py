@@ -167,10 +167,6 @@ class FreeThickness:
 
     films: Mapping[ElasticFilm, ElasticFilm]
 
-    def estimated(self, scans: Sequence[Scan]) -> tuple[Scan, ...]:
-        """Return the scans with the thickness and its uncertainty as estimated."""
-        return tuple(replace(scan, film=self.films[scan.set_up.film]) for scan in scans)
-
     @property
     def record(self) -> Values:
         """What files and JSON hold: prior and posterior of each film's thickness."""
@@ -296,10 +292,9 @@ def free_thickness(solution: Solution) -> FreeThickness:
         if (spread > half_step).all():
             break
         reach = np.minimum(reach, _WIDTHS * np.maximum(spread, half_step))
-    estimated = {}
-    thicknesses = stated + middle * u
-    uncertainties = np.minimum(spread, 1.0) * u
-    for film, thickness, left in zip(films, thicknesses, uncertainties, strict=True):
-        h = float(thickness)
-        estimated[film] = replace(film, thickness=h, thickness_uncertainty=float(left))
+    posterior = np.column_stack([stated + middle * u, np.minimum(spread, 1.0) * u])
+    estimated = {
+        film: replace(film, thickness=thickness, thickness_uncertainty=left)
+        for film, (thickness, left) in zip(films, posterior.tolist(), strict=True)
+    }
     return FreeThickness(estimated)

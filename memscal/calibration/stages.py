@@ -49,7 +49,7 @@ def solve(
     channel: str = "zz",
     *,
     centre: str | None = COMMON,
-    owners: Sequence[int] | None = None,
+    owners: Sequence[int] = (),
     per: str = "Pa",
 ) -> Solution:
     """Find A and G."""
