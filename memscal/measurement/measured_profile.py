@@ -196,7 +196,7 @@ class _Found:
 
 
 def _found(scan: Scan, apparatus: ApparatusFunction) -> _Found:
-    estimate, _ = gaussian_pressure(scan, apparatus)
+    estimate = gaussian_pressure(scan, apparatus)
     return _Found(
         estimate.centre,
         estimate.distance,
@@ -211,7 +211,7 @@ def _found(scan: Scan, apparatus: ApparatusFunction) -> _Found:
 def _found_quickly(scan: Scan, apparatus: ApparatusFunction) -> _Found:
     # Without departures, in a tenth of the time.
     points = measured_points(scan)
-    model = forward_model(points, [unit_force(scan, apparatus, points)[0]])
+    model = forward_model(points, [unit_force(scan, apparatus, points)])
     with undetermined():
         fit = fit_gaussian_to_points(model, stated_weights(points))
     signal = fit.conversion_constant * fit.jacobian[:, 0]

@@ -345,10 +345,8 @@ def reach_of(points: ScanPoints) -> float:
     return _REACH * points.span
 
 
-def posterior_of(
-    scan: Scan, apparatus: ApparatusFunction, estimate: ProfileEstimate, transfer: FloatArray
-) -> Posterior:
-    """Average the shapes of pressure and propagate the inputs; ``transfer``: A G's, in V/Pa."""
+def posterior_of(scan: Scan, apparatus: ApparatusFunction, estimate: ProfileEstimate) -> Posterior:
+    """Average the shapes of pressure and propagate the inputs."""
     averaged = _averaged_shapes(scan, estimate)
     mean = averaged.state
     model = estimate.model
@@ -363,6 +361,7 @@ def posterior_of(
     names = tuple(name for name in by_film | shared if name != "load")
     of_film = columns_of(by_film, names, nodes)
     of_kernel = columns_of(shared, names, nodes)
+    transfer = apparatus.conversion_constant * sensor_changes(apparatus, model.k)[0]
     together = of_film * transfer[:, None] + of_kernel * film[:, None]
     _, sensor = sensor_changes(apparatus, model.k, shared)
     slope = model.radial_derivative(estimate.gaussian.geometry, mean[:nodes])
