@@ -25,7 +25,7 @@ from memscal.estimation.points import TANGENTIAL, ScanPoints, measured_mask, mea
 from memscal.estimation.profile import NUMERICAL_FLOOR, ProfileEstimate, stated_weights
 from memscal.estimation.voltage_map import square_root
 from memscal.extensions import hook
-from memscal.measurement.posterior import columns_of, film_transfer, sensor_changes, shared_changes
+from memscal.measurement.posterior import columns_of, sensor_changes, shared_changes
 from memscal.measurement.restoration import Restoration
 from memscal.measurement.restore import gaussian_pressure, load_of, undetermined, unit_force
 from memscal.mechanics.contact import Contact
@@ -445,8 +445,7 @@ def _place_roots(restored: Restoration, average: Any) -> Arrays:
     """Roots of the covariance that centre, baseline and drift bring, shared out without a rest."""
     posterior = restored.posterior
     model = posterior.estimate.model
-    film = film_transfer(restored.scan.set_up.expected, model.reference.wavenumbers)
-    pressure = posterior.stress / restored.scan.stated_load / film
+    pressure = posterior.stress / restored.scan.stated_load / posterior.film
     a = restored.apparatus.conversion_constant
     geometry = model.geometry(restored.centre)
     by_centre = average @ model.centre_derivative(geometry, pressure) / a

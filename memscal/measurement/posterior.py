@@ -311,6 +311,7 @@ class Posterior:
     covariances: Arrays  # (s, s) by source, independent
     shifts: Arrays  # (n, q) by source: change of the voltages, in V
     changes: Arrays  # (s, q) by source: change of the state
+    film: FloatArray  # (k,): stress at the base over the pressure on the film, by their transforms
     film_inputs: tuple[str, ...]  # whose uncertainties the columns of source ``film`` are
     nodes: int  # how many entries of the state are the transform
     first_drift: int  # place of the baseline, behind the free centre
@@ -394,6 +395,7 @@ def posterior_of(scan: Scan, apparatus: ApparatusFunction, estimate: ProfileEsti
         covariances=covariances,
         shifts=shifts,
         changes=changes,
+        film=film,
         film_inputs=names,
         nodes=nodes,
         first_drift=nodes + estimate.points.free.sum(),

@@ -13,7 +13,7 @@ from memscal.axisymmetry.hankel import hankel_transform
 from memscal.errors import InputError
 from memscal.estimation.points import ScanPoints
 from memscal.formats.reference import read_reference
-from memscal.measurement.posterior import Posterior, film_transfer, reach_of, sensor_changes
+from memscal.measurement.posterior import Posterior, reach_of, sensor_changes
 from memscal.mechanics.contact import BaseStress, Contact
 from memscal.model.arrays import FloatArray, array_record, floats
 from memscal.model.checks import (
@@ -346,7 +346,7 @@ def _direct(restored: Restoration, spectrum: FloatArray) -> tuple[float, int]:
     model = estimate.model
     # Repeats share the centre, which is zero across a line.
     geometry = model.geometry(restored.centre)
-    pressure = spectrum / film_transfer(scan.set_up.expected, model.reference.wavenumbers)
+    pressure = spectrum / posterior.film
     signal = model.signal(geometry, pressure)
     # One load cell errs alike under the rod, which changes A, and under the contact.
     by_load = (scan.load_uncertainty or 0.0) / scan.stated_load * signal[:, None]
