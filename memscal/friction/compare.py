@@ -60,7 +60,7 @@ def scans_of(contacts: Sequence[Scan | MeasuredStress]) -> list[Scan | MeasuredS
     return scans
 
 
-def require_contacts(scans: Sequence[Scan | MeasuredScan], *, sliding: bool = False) -> None:
+def require_contacts(scans: Sequence[Scan | MeasuredScan], *, sliding: bool) -> None:
     """Refuse what is no scan of a sphere's contacts, or not all on one film with one sphere."""
     for scan in scans:
         place = place_of(scan)
