@@ -297,8 +297,8 @@ def _with_thickness(prepared: Prepared) -> Prepared:
     require_free(prepared.request.free, prepared.scans, prepared.references)
     thickness = free_thickness(_solved(prepared))
     films = thickness.films
-    scans = tuple(replace(scan, film=films[scan.set_up.film]) for scan in prepared.scans)
-    stresses = tuple(reference_profile(scan, None) for scan in scans)
+    scans = [replace(scan, film=films[scan.set_up.film]) for scan in prepared.scans]
+    stresses = [reference_profile(scan, None) for scan in scans]
     return replace(prepared, scans=scans, stresses=stresses, thickness=thickness)
 
 

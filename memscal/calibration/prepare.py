@@ -74,10 +74,10 @@ class Prepared:
     """What a calibration starts from: scans with the film and loads that count, and references."""
 
     request: Request
-    as_stated: tuple[Scan, ...]
-    scans: tuple[Scan, ...]
+    as_stated: Sequence[Scan]
+    scans: Sequence[Scan]
     references: Sequence[BaseStress | None]  # as given
-    stresses: tuple[BaseStress, ...]  # as taken, one of each scan
+    stresses: Sequence[BaseStress]  # as taken, one of each scan
     alternatives: Sequence[BaseStress | None]  # none or, as the references, one of each scan
     owners: Sequence[int]  # of scans that were split by their loads; else none
     reading: Reading
@@ -137,9 +137,9 @@ def prepare(as_stated: Sequence[Scan], request: Request) -> Prepared:
     return Prepared(
         request=request,
         as_stated=as_stated,
-        scans=tuple(scans),
+        scans=scans,
         references=references,
-        stresses=tuple(stresses),
+        stresses=stresses,
         alternatives=alternatives,
         owners=owners,
         reading=replace(scans[0].reading, per=per),

@@ -529,11 +529,11 @@ class Likelihood:
 
     values: FloatArray
     coordinates: FloatArray
-    loads: tuple[Standardised, ...]
+    loads: Sequence[Standardised]
 
     def only(self, chosen: Sequence[int]) -> Likelihood:
         """Return the likelihood of some of the loads."""
-        return replace(self, loads=tuple(self.loads[i] for i in chosen))
+        return replace(self, loads=[self.loads[i] for i in chosen])
 
     def with_held(self, held: Likelihood, spread: float) -> Likelihood:
         """Add loads that are held at one value; all share systematic errors.
@@ -544,7 +544,7 @@ class Likelihood:
         for load in held.loads:
             moved = load.with_lubricated_friction(spread)
             loads.append(replace(moved, slope=np.zeros_like(load.slope)))
-        return replace(self, loads=tuple(loads))
+        return replace(self, loads=loads)
 
     def averaged_over(self, held: Likelihood, weights: FloatArray) -> ArrayTriple:
         """Average the likelihood over values (W,) of other loads; all share systematic errors.
@@ -637,4 +637,4 @@ def likelihood(channel: Channel, *shear: Channel) -> Likelihood:
     for i in range(len(channel.points)):
         both = [each.readings(i) for each in (channel, *shear)]
         loads.append(standardise(*reduce(stacked, both)))
-    return Likelihood(channel.family.values, channel.family.coordinates, tuple(loads))
+    return Likelihood(channel.family.values, channel.family.coordinates, loads)

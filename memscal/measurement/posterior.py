@@ -133,11 +133,11 @@ def _shear_ratio(film: ElasticFilm, k: bytes) -> FloatArray:
     return by_shear / by_pressure
 
 
-def pressure_shapes(film: ElasticFilm) -> tuple[PressureShape, ...]:
+def pressure_shapes(film: ElasticFilm) -> list[PressureShape]:
     """Return the shapes that a restoration averages."""
     # Above a Poisson's ratio of 0.4 a pressed film flows outward under the indenter.
     shears = _SHEARS_INCOMPRESSIBLE if film.poisson_ratio > 0.4 else _SHEARS_COMPRESSIBLE
-    return tuple(PressureShape(m, c, film) for m in _EXPONENTS for c in shears)
+    return [PressureShape(m, c, film) for m in _EXPONENTS for c in shears]
 
 
 #: A fit diverges if its width is this many times the Gaussian's, or that fraction of it.
@@ -312,7 +312,7 @@ class Posterior:
     shifts: Arrays  # (n, q) by source: change of the voltages, in V
     changes: Arrays  # (s, q) by source: change of the state
     film: FloatArray  # (k,): stress at the base over the pressure on the film, by their transforms
-    film_inputs: tuple[str, ...]  # whose uncertainties the columns of source ``film`` are
+    film_inputs: Sequence[str]  # whose uncertainties the columns of source ``film`` are
     nodes: int  # how many entries of the state are the transform
     first_drift: int  # place of the baseline, behind the free centre
     residual: FloatArray  # (n,), in V
@@ -359,7 +359,7 @@ def posterior_of(scan: Scan, apparatus: ApparatusFunction, estimate: ProfileEsti
     by_film = film_changes(set_up, wavenumbers)
     shared = shared_changes(apparatus, [scan], model.k)
     # One error of a film that sensor and contact share changes A G and the film's transfer.
-    names = tuple(name for name in by_film | shared if name != "load")
+    names = [name for name in by_film | shared if name != "load"]
     of_film = columns_of(by_film, names, nodes)
     of_kernel = columns_of(shared, names, nodes)
     transfer = apparatus.conversion_constant * sensor_changes(apparatus, model.k)[0]
