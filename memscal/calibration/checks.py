@@ -199,14 +199,13 @@ def _agreement(solution: Solution, results: Results, division: DivisionMap | Non
 
 def _shape(solution: Solution, parameters: ParameterSet) -> _Checks:
     """Look for what divisions that went wrong do to G: spikes, lobes and ripples."""
-    deconvolution = solution.deconvolution
-    g = deconvolution.g
+    g = solution.deconvolution.g
     ratios = [parameters["fwhm"] / (_HALF_WIDTH * parameters[name]) for name in _WIDTHS]
     widest = max(max(ratio, 1 / ratio) for ratio in ratios)
     share = ring_areas(g.r) * g.radial
     negative = np.maximum(-share, 0.0).sum() / abs(share).sum()
-    k, transfer = solution.fields.grid.axis_transfer(deconvolution.quotient.values)
-    power = k * abs(transfer / deconvolution.conversion_constant) ** 2
+    k, modulus = solution.transfer
+    power = k * modulus**2
     end = max(solution.band.resolved, solution.band.relevant, 2 / solution.estimate.gaussian.sigma)
     rough = power[k > _BEYOND * end].sum() / power.sum()
     cure = "take method white-noise or bayesian, or more regularisation"

@@ -29,7 +29,7 @@ from memscal.estimation.reference_spectra import expected_spectra, reference_spe
 from memscal.estimation.runs import CentresApart, repeat_centres_test
 from memscal.estimation.smoothing import SmoothedProfile, smooth_profile
 from memscal.mechanics.contact import BaseStress
-from memscal.model.arrays import FloatArray, array_record, value_record
+from memscal.model.arrays import ArrayPair, FloatArray, array_record, floats, value_record
 from memscal.model.checks import FALSE_ALARM
 from memscal.model.scan import Scan
 from memscal.progress import done_with
@@ -259,6 +259,12 @@ class Solution:
             return None
         other = WhiteNoise() if isinstance(self.method, Bayesian) else Bayesian()
         return deconvolve(self.estimate, self.band, self.fields, other)
+
+    @property
+    def transfer(self) -> ArrayPair:
+        """Wavenumbers along an axis, in rad/m, and the modulus of the transfer function there."""
+        k, spectrum = self.fields.grid.axis_transfer(self.deconvolution.quotient.values)
+        return k, floats(abs(spectrum) / self.deconvolution.conversion_constant)
 
     @property
     def on_films(self) -> bool:
