@@ -53,15 +53,13 @@ def assemble(
         method = "white-noise" if isinstance(solution.method, Bayesian) else "bayesian"
         radial = _radial(solution, solution.other, other)
         other_estimate = OtherEstimate(method, other.parameters.only(_BY_ROUTE), radial)
-    quotient = solution.deconvolution.quotient
-    k, transfer = solution.fields.grid.axis_transfer(quotient.values)
-    modulus = np.abs(transfer) / solution.deconvolution.conversion_constant
+    window = solution.deconvolution.quotient.window[0]
     messages = calibration_messages(prepared, solution, results, checks, laws, assumptions)
     return ApparatusFunction(
         plane=_plane(solution, results),
         radial_profile=_radial(solution, solution.deconvolution, results),
         transfer=TransferFunction(
-            k, modulus, results.transfer_errors, quotient.window[0], solution.band.resolved
+            *solution.transfer, results.transfer_errors, window, solution.band.resolved
         ),
         reconvolution=_reconvolution(solution),
         parameters=results.parameters,

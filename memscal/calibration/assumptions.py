@@ -164,6 +164,6 @@ def _correlations(solution: Solution, results: Results) -> dict[str, float]:
             lags = np.arange(1, alike.size)
             products = np.correlate(alike, alike, "full")[alike.size :]
             added += 2 * (_CORRELATIONS[:, None] ** lags) @ products
-        beyond = np.flatnonzero(added >= results.parameters.uncertainty(parameter) ** 2)
-        sizes[parameter] = float(_CORRELATIONS[beyond[0]]) if beyond.size else math.inf
+        beyond = _CORRELATIONS[added >= results.parameters.uncertainty(parameter) ** 2]
+        sizes[parameter] = float(beyond[0]) if beyond.size else math.inf
     return sizes

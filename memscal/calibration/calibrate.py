@@ -296,8 +296,9 @@ def _with_thickness(prepared: Prepared) -> Prepared:
     """Estimate the thickness of the films from the scans, and take it for that of the rods."""
     require_free(prepared.request.free, prepared.scans, prepared.references)
     thickness = free_thickness(_solved(prepared))
-    scans = thickness.estimated(prepared.scans)
-    stresses = tuple(reference_profile(scan, None) for scan in scans)
+    films = thickness.films
+    scans = [replace(scan, film=films[scan.set_up.film]) for scan in prepared.scans]
+    stresses = [reference_profile(scan, None) for scan in scans]
     return replace(prepared, scans=scans, stresses=stresses, thickness=thickness)
 
 
@@ -336,7 +337,7 @@ def _require_distinct(results: Results, solution: Solution) -> None:
     )
 
 
-def _effects(solution: Solution, alternatives: Sequence[BaseStress | None] | None) -> Effects:
+def _effects(solution: Solution, alternatives: Sequence[BaseStress | None]) -> Effects:
     """Return what the inputs change, to first order; two laws of the film, by calibrating twice."""
     scans = solution.scans
     estimate = solution.estimate

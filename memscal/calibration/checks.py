@@ -153,7 +153,7 @@ def _constraint(solution: Solution) -> _Checks:
     weights = estimate.weights / estimate.noise_scale**2
     kept = points.standardised(points.u - solution.deconvolution.predicted, weights)
     free = points.standardised(points.u - estimate.predicted, weights)
-    rise = np.sum(kept**2) - np.sum(free**2)
+    rise = float(kept @ kept - free @ free)
     # As many combinations of departures as the scan determines, and as a constraint may remove.
     determined = free_model(estimate).design.shape[1]
     determined -= estimate.gaussian.jacobian.shape[1]
@@ -180,13 +180,11 @@ def _agreement(solution: Solution, results: Results, division: DivisionMap | Non
             "failed: look at the residuals and at both G(r).",
         )
     route = "by division of the fields" if solution.deconvolution.divided else "in data space"
-    parameters = results.parameters
-    i, j = (parameters.names.index(name) for name in _WIDTHS)
-    covariance = parameters.covariance
-    fitted, deconvolved = parameters.values[[i, j]]
+    widths = results.parameters.only(_WIDTHS)
+    fitted, deconvolved = widths.values
     # The misfit is what is looked for: no allowance is made for it.
     misfit = results.budget["gaussian_sigma"]["misfit"]
-    variance = covariance[i, i] + covariance[j, j] - 2 * covariance[i, j] - misfit**2
+    variance = float([1, -1] @ widths.covariance @ [1, -1]) - misfit**2
     # Differences below a fifth of a percent are negligible, however small their noise.
     allowed = np.hypot(np.sqrt(max(variance, 0.0)), 0.002 * fitted)
     yield check(
@@ -201,14 +199,13 @@ def _agreement(solution: Solution, results: Results, division: DivisionMap | Non
 
 def _shape(solution: Solution, parameters: ParameterSet) -> _Checks:
     """Look for what divisions that went wrong do to G: spikes, lobes and ripples."""
-    deconvolution = solution.deconvolution
-    g = deconvolution.g
+    g = solution.deconvolution.g
     ratios = [parameters["fwhm"] / (_HALF_WIDTH * parameters[name]) for name in _WIDTHS]
     widest = max(max(ratio, 1 / ratio) for ratio in ratios)
     share = ring_areas(g.r) * g.radial
     negative = np.maximum(-share, 0.0).sum() / abs(share).sum()
-    k, transfer = solution.fields.grid.axis_transfer(deconvolution.quotient.values)
-    power = k * abs(transfer / deconvolution.conversion_constant) ** 2
+    k, modulus = solution.transfer
+    power = k * modulus**2
     end = max(solution.band.resolved, solution.band.relevant, 2 / solution.estimate.gaussian.sigma)
     rough = power[k > _BEYOND * end].sum() / power.sum()
     cure = "take method white-noise or bayesian, or more regularisation"
@@ -431,8 +428,7 @@ def _bayes_factor(estimate: ProfileEstimate) -> QualityCheck:
     departed = logsumexp(weighed.log_marginals[1:], b=priors / priors.sum())
     kinds: dict[str, float] = {}
     for hypothesis, departure in zip(HYPOTHESES[1:], weighed.probability[1:], strict=True):
-        if hypothesis.estimate > 0:
-            kinds[hypothesis.kind] = kinds.get(hypothesis.kind, 0.0) + departure
+        kinds[hypothesis.kind] = kinds.get(hypothesis.kind, 0.0) + departure
     if estimate.free:
         departed = weighed.free
         kinds = {"plane": 1.0}
@@ -517,10 +513,12 @@ def _hysteresis(estimate: ProfileEstimate) -> _Checks:
         ("the centre's position", 1e-6, "um"),
         ("the baseline", reading.scale, reading.unit),
     )
-    differences = []
-    each = zip(units, branches.values, branches.errors, strict=False)
-    for (name, scale, unit), value, error in each:
-        differences.append(f"of {name} by {format_measured(value / scale, error / scale, unit)}")
+    differences = [
+        f"of {name} by {format_measured(value / scale, error / scale, unit)}"
+        for (name, scale, unit), value, error in zip(
+            units, branches.values, branches.errors, strict=False
+        )
+    ]
     yield _tested(
         "hysteresis",
         branches.outcome,

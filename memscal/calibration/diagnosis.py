@@ -100,7 +100,7 @@ def diagnosed(
     for measured in points:
         step = -(-measured.u.size // _MOST_POINTS)
         some.append(measured.selected(np.arange(0, measured.u.size, step)))
-    search = _Search(tuple(scans), tuple(stresses), tuple(some))
+    search = _Search(scans, stresses, some)
     error = search.error()
     if error:
         return error
@@ -200,12 +200,12 @@ class _Length:
 class _Search:
     """Scans whose stated lengths are scaled, one at a time."""
 
-    scans: tuple[Scan, ...]
-    stresses: tuple[BaseStress, ...]
-    points: tuple[ScanPoints, ...]
+    scans: Sequence[Scan]
+    stresses: Sequence[BaseStress]
+    points: Sequence[ScanPoints]
 
     @cached_property
-    def lengths(self) -> tuple[_Length, ...]:
+    def lengths(self) -> Sequence[_Length]:
         """Lengths that make the reference narrower than the scan."""
         span = max(max(np.ptp(p.x), np.ptp(p.y)) for p in self.points)
         h = min(scan.film.thickness if scan.film else span / _USUAL_SPAN for scan in self.scans)
@@ -307,9 +307,9 @@ class _Search:
         points = self.points
         stresses = self.stresses
         if length.path == "/entry/data/x":
-            points = tuple(replace(p, x=p.x * factor, y=p.y * factor) for p in points)
+            points = [replace(p, x=p.x * factor, y=p.y * factor) for p in points]
         else:
-            stresses = tuple(_scaled(stress, length.path, factor) for stress in stresses)
+            stresses = [_scaled(stress, length.path, factor) for stress in stresses]
         joined = joined_points(points)
         weights = stated_weights(joined)
         with np.errstate(all="ignore"), suppress(MemscalError, np.linalg.LinAlgError):

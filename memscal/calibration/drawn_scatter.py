@@ -97,8 +97,5 @@ def _divided(
     sigma = estimate.gaussian.sigma + (gain[1:2] @ error)[0]
     wider = replace(estimate, gaussian=replace(estimate.gaussian, sigma=sigma))
     again = solved(solution.scans, solution.stresses, estimate, method, wider)
-    drawn = again.deconvolution
-    k, spectrum = again.fields.grid.axis_transfer(drawn.quotient.values)
-    wavenumbers = solution.fields.grid.wavenumber_axis
-    transfer = np.interp(wavenumbers, k, abs(spectrum) / drawn.conversion_constant, right=0.0)
-    return *read_off(drawn, solution.deconvolution.g.r), transfer
+    transfer = np.interp(solution.fields.grid.wavenumber_axis, *again.transfer, right=0.0)
+    return *read_off(again.deconvolution, solution.deconvolution.g.r), transfer

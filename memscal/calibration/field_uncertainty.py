@@ -24,6 +24,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import fftfreq, fftshift, ifftshift, irfft2, rfft2, rfftfreq
+from scipy.linalg import block_diag
 
 from memscal.calibration.fields import cosine_taper
 from memscal.calibration.stages import Solution
@@ -67,9 +68,8 @@ def field_errors(solution: Solution, effects: Effects, correlations: Correlation
         inputs = voltages.T @ square_root(correlation_matrix(list(effects), correlations))
     reach = np.inf if deconvolution.divided else fields.support + 4 * fields.step
     x, y = (_nodes(axis, estimate.gaussian.sigma, reach) for axis in fields.central.axes)
-    inside_y = np.clip(y, g.y[0], g.y[-1])
-    inside_x = np.clip(x, g.x[0], g.x[-1])
-    at_nodes = RectBivariateSpline(g.y, g.x, g.image)(inside_y, inside_x)
+    # Beyond its axes the spline keeps its last values.
+    at_nodes = RectBivariateSpline(g.y, g.x, g.image)(y, x)
     at_nodes[np.hypot.outer(y, x) >= fields.support] = 0.0
     variances_of = _division_variances if deconvolution.divided else _posterior_variances
     variances = variances_of(solution, (x, y), at_nodes.ravel(), inputs)
@@ -136,9 +136,9 @@ class _Filter:
     at_nodes: list[ComplexArray]  # (ky, m), (kx, n)
     at_g: list[ComplexArray]
     at_points: list[ComplexArray]
-    twice: FloatArray  # (kx,): components of negative kx are the conjugates of the others
+    # (kx,), over the nodes of the lattice: components of negative kx are conjugates of the others.
+    weights: FloatArray
     every: int  # nodes of the lattice for each of the nodes
-    count: int  # nodes of the lattice
     share: FloatArray  # (n,): what a reading adds to its node, over its voltage
     places: IndexArray  # (n,): of the readings' nodes in the box that holds them all
 
@@ -146,7 +146,6 @@ class _Filter:
     def of(
         cls,
         fields: Any,
-        share: FloatArray,
         ratio: ComplexArray,
         window: FloatArray,
         axes: ArrayPair,
@@ -174,10 +173,10 @@ class _Filter:
             every *= round((axes[i][1] - axes[i][0]) / step)
         box = (at_points[0].shape[1], at_points[1].shape[1])
         open_ = np.ix_(*band)
-        twice = np.where(band[1] == 0, 1.0, 2.0)
+        weights = np.where(band[1] == 0, 1.0, 2.0) / (m * n)
         places = np.ravel_multi_index(index, box)
         passing = (ratio[open_], window[open_])
-        return cls(*passing, at_nodes, at_g, at_points, twice, every, m * n, share, places)
+        return cls(*passing, at_nodes, at_g, at_points, weights, every, fields.share, places)
 
     def passed(self, kernels: FloatArray) -> FloatArray:
         """What the window passes of kernels (nodes, q), where G is stated."""
@@ -191,7 +190,7 @@ class _Filter:
 
     def _at_g(self, spectra: ComplexArray) -> FloatArray:
         rows, columns = self.at_g
-        along = spectra @ (self.twice[:, None] * columns.conj() / self.count)
+        along = spectra @ (self.weights[:, None] * columns.conj())
         # The real part of the product.
         planes = rows.real.T @ along.real + rows.imag.T @ along.imag
         return planes.reshape(len(planes), -1).T
@@ -257,8 +256,8 @@ def _division_variances(
     window = deconvolution.quotient.window
     stress = grid.forward(fields.stress.values)
     ratio = np.divide(window, stress, out=np.zeros_like(stress), where=window > _CLOSED)
-    share = fields.share(solution.smoothed)
-    division = _Filter.of(fields, share, ratio, window, (y, x), stated)
+    share = fields.share
+    division = _Filter.of(fields, ratio, window, (y, x), stated)
     taper = cosine_taper(np.hypot.outer(y, x).ravel()[inside], fields.support)
     moved, hidden, sums = _by_parameters(estimate, axes, inside, taper, division)
     count = moved.shape[1]
@@ -292,8 +291,7 @@ def _division_variances(
     with_a = changed((noise * by_a)[:, None])[:, 0]
     variance = taper**2 * variance - 2 * g * with_a + g**2 * (by_a**2 @ noise)
     rest = np.sum((changed(inputs) - np.outer(g, by_a @ inputs)) ** 2, axis=1)
-    root = np.eye(count + 1)
-    root[:-1, :-1] = square_root(estimate.weighed.covariance)
+    root = block_diag(square_root(estimate.weighed.covariance), [1.0])
     sums = grid.cell_area * division.every * (sums @ root)
     for some in slices(count + 1, _COLUMNS):
         rest += np.sum((hidden @ root[:, some] - np.outer(g, sums[some])) ** 2, axis=1)

@@ -147,6 +147,7 @@ class RasterFields:
     step: float
     oval: Callable[[FloatArray, FloatArray], FloatArray]
     index: tuple[IndexArray, IndexArray]
+    share: FloatArray  # (n,): what each reading adds to its node, over its voltage, in 1/N
     even: bool
 
     @classmethod
@@ -190,14 +191,13 @@ class RasterFields:
         if reference.model:
             # The profile is that of the field's mean over directions.
             voltage += grid.convolve(on_grid(estimate.radial, central, step), stress - round_)
+        share = np.zeros(0)
         if rows.size:
+            readings = np.zeros(voltage.shape)
+            np.add.at(readings, (rows, columns), 1.0)
+            share = estimate.outlier_weight / (points.load * readings[rows, columns])
             # A point that is missing keeps what was fitted; an outlier keeps most of it.
-            departure = (smoothed.signal - smoothed.predicted) * estimate.outlier_weight
-            total = np.zeros(voltage.shape)
-            number = np.zeros(voltage.shape)
-            np.add.at(total, (rows, columns), departure / points.load)
-            np.add.at(number, (rows, columns), 1.0)
-            voltage += total / np.maximum(number, 1.0)
+            np.add.at(voltage, (rows, columns), share * (smoothed.signal - smoothed.predicted))
         return cls(
             grid,
             central,
@@ -208,6 +208,7 @@ class RasterFields:
             step,
             estimate.oval_kernel,
             (rows, columns),
+            share,
             even,
         )
 
@@ -222,19 +223,11 @@ class RasterFields:
         """Convolve a kernel with the stress: its values at the measured points."""
         return reconvolve(1.0, kernel, self.stress).values[self.index]
 
-    def share(self, smoothed: SmoothedProfile) -> FloatArray:
-        """What each reading (n,) adds to its node, over its voltage, in 1/N."""
-        readings = np.zeros(self.voltage.values.shape)
-        np.add.at(readings, self.index, 1.0)
-        weight = smoothed.estimate.outlier_weight / smoothed.estimate.points.load
-        return weight / readings[self.index]
-
     def gain(self, smoothed: SmoothedProfile) -> VoltageMap:
         """Derivative of the field's transform by the voltages, (k, n), its mean over directions."""
         # The transform is a sum over the lattice: of the points, and of the profile elsewhere.
-        share = self.share(smoothed)
         profiled = np.ones_like(self.voltage.values)
-        np.subtract.at(profiled, self.index, share * smoothed.estimate.points.load)
+        np.subtract.at(profiled, self.index, self.share * smoothed.estimate.points.load)
         radius = self.grid.radius
         table = wave_table(0, False, radius.max(), smoothed.estimate.model.k.tobytes())
         coefficients = table.spline.c
@@ -242,7 +235,7 @@ class RasterFields:
         # J0(k r) J0(k' r) over what has something of the profile, by the table's splines.
         both = (everywhere.T @ everywhere.multiply(profiled.reshape(-1, 1))) @ coefficients
         elsewhere = (coefficients.T @ both) * smoothed.spectrum.wavenumbers.weights
-        own = table.interpolation(radius[self.index]).multiply(share[:, None]).tocsr()
+        own = table.interpolation(radius[self.index]).multiply(self.share[:, None]).tocsr()
         by_points = VoltageMap(((coefficients.T, own),))
         by_profile: VoltageMap = elsewhere @ smoothed.gain
         return (by_points + by_profile) * self.grid.cell_area

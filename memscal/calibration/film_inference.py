@@ -50,9 +50,9 @@ class WeighedLaw:
 class FilmLawComparison:
     """Laws of the film, by falling evidence, and that of the reference (empty: not stated)."""
 
-    laws: tuple[WeighedLaw, ...]
+    laws: Sequence[WeighedLaw]
     reference: str
-    loads: tuple[float, ...]  # in N
+    loads: Sequence[float]  # in N
     reading: Reading
 
     def factor(self, law: WeighedLaw) -> BayesFactor:
@@ -104,7 +104,7 @@ class FilmLawComparison:
 
 def weigh_laws(solution: Solution) -> FilmLawComparison | None:
     """Weigh the film's laws by scans at several loads; ``None`` where one load or law is left."""
-    loads = tuple(scan.stated_load for scan in solution.scans)
+    loads = [scan.stated_load for scan in solution.scans]
     if not (loads_differ(loads) and solution.on_films):
         return None
     films = [film_of(stress) for stress in solution.stresses]
@@ -118,7 +118,7 @@ def weigh_laws(solution: Solution) -> FilmLawComparison | None:
             film = replace(scan.set_up.film, law=law, mooney_rivlin_ratio=known)
             scans.append(replace(scan, film=film))
         if law == reference:
-            solutions[law] = replace(solution, scans=tuple(scans))
+            solutions[law] = replace(solution, scans=scans)
         # Finite elements take long: other laws are weighed where closed form or table has them.
         elif law == LINEAR or all(is_tabulated(*scan.set_up) for scan in scans):
             stresses = [press_rod(*scan.set_up) for scan in scans]
@@ -139,7 +139,7 @@ def weigh_laws(solution: Solution) -> FilmLawComparison | None:
         a = by_law.deconvolution.conversion_constant
         laws.append(WeighedLaw(law, evidence, a, estimate.gaussian.sigma))
     laws.sort(key=lambda law: -law.log_evidence)
-    return FilmLawComparison(tuple(laws), reference, loads, solution.scan.reading)
+    return FilmLawComparison(laws, reference, loads, solution.scan.reading)
 
 
 def _input_columns(solution: Solution, without: str = "") -> FloatArray:
@@ -166,10 +166,6 @@ class FreeThickness:
     """Posterior of the thickness of films by scans: each film as stated, and as estimated."""
 
     films: Mapping[ElasticFilm, ElasticFilm]
-
-    def estimated(self, scans: Sequence[Scan]) -> tuple[Scan, ...]:
-        """Return the scans with the thickness and its uncertainty as estimated."""
-        return tuple(replace(scan, film=self.films[scan.set_up.film]) for scan in scans)
 
     @property
     def record(self) -> Values:
@@ -296,10 +292,9 @@ def free_thickness(solution: Solution) -> FreeThickness:
         if (spread > half_step).all():
             break
         reach = np.minimum(reach, _WIDTHS * np.maximum(spread, half_step))
-    estimated = {}
-    thicknesses = stated + middle * u
-    uncertainties = np.minimum(spread, 1.0) * u
-    for film, thickness, left in zip(films, thicknesses, uncertainties, strict=True):
-        h = float(thickness)
-        estimated[film] = replace(film, thickness=h, thickness_uncertainty=float(left))
+    posterior = np.column_stack([stated + middle * u, np.minimum(spread, 1.0) * u])
+    estimated = {
+        film: replace(film, thickness=thickness, thickness_uncertainty=left)
+        for film, (thickness, left) in zip(films, posterior.tolist(), strict=True)
+    }
     return FreeThickness(estimated)

@@ -74,12 +74,12 @@ class Prepared:
     """What a calibration starts from: scans with the film and loads that count, and references."""
 
     request: Request
-    as_stated: tuple[Scan, ...]
-    scans: tuple[Scan, ...]
+    as_stated: Sequence[Scan]
+    scans: Sequence[Scan]
     references: Sequence[BaseStress | None]  # as given
-    stresses: tuple[BaseStress, ...]  # as taken, one of each scan
-    alternatives: Sequence[BaseStress | None] | None
-    owners: Sequence[int] | None  # of scans that were split by their loads
+    stresses: Sequence[BaseStress]  # as taken, one of each scan
+    alternatives: Sequence[BaseStress | None]  # none or, as the references, one of each scan
+    owners: Sequence[int]  # of scans that were split by their loads; else none
     reading: Reading
     overridden: list[str]
     thickness: "FreeThickness | None" = None  # of the films, where the scans determine it
@@ -114,17 +114,15 @@ def prepare(as_stated: Sequence[Scan], request: Request) -> Prepared:
                 scan, load=load, load_uncertainty=None, normal_load=None, normal_load_errors=None
             )
         scans.append(scan)
-    alternatives = None
+    alternatives: list[BaseStress | None] = []
     if request.alternative is not None:
         alternatives = _references(request.alternative, scans, replace(request, pixel_size=None))
-    overridden = require_same_set_up(
-        scans, references, alternatives or (), override=request.override
-    )
-    files = (*as_stated, *references, *(alternatives or ()))
+    overridden = require_same_set_up(scans, references, alternatives, override=request.override)
+    files = (*as_stated, *references, *alternatives)
     overridden[:0] = accepted_alterations(*(getattr(file, "source", None) for file in files))
     scans = list(map(with_film_of, references, scans))
-    require_one_kind(stated, alternatives or ())
-    owners: Sequence[int] | None = None
+    require_one_kind(stated, alternatives)
+    owners: Sequence[int] = ()
     if not any(stated) and any(s.set_up.film.law != LINEAR for s in scans):
         scans, owners = scans_by_load(scans)  # whose stresses have shapes of their own
         references = [None] * len(scans)
@@ -139,9 +137,9 @@ def prepare(as_stated: Sequence[Scan], request: Request) -> Prepared:
     return Prepared(
         request=request,
         as_stated=as_stated,
-        scans=tuple(scans),
+        scans=scans,
         references=references,
-        stresses=tuple(stresses),
+        stresses=stresses,
         alternatives=alternatives,
         owners=owners,
         reading=replace(scans[0].reading, per=per),

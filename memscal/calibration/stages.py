@@ -29,7 +29,7 @@ from memscal.estimation.reference_spectra import expected_spectra, reference_spe
 from memscal.estimation.runs import CentresApart, repeat_centres_test
 from memscal.estimation.smoothing import SmoothedProfile, smooth_profile
 from memscal.mechanics.contact import BaseStress
-from memscal.model.arrays import FloatArray, array_record, value_record
+from memscal.model.arrays import ArrayPair, FloatArray, array_record, floats, value_record
 from memscal.model.checks import FALSE_ALARM
 from memscal.model.scan import Scan
 from memscal.progress import done_with
@@ -49,14 +49,14 @@ def solve(
     channel: str = "zz",
     *,
     centre: str | None = COMMON,
-    owners: Sequence[int] | None = None,
+    owners: Sequence[int] = (),
     per: str = "Pa",
 ) -> Solution:
     """Find A and G."""
     # ``centre``: of a scan, or of each of its repeats; ``None`` leaves it to a test. ``owners``:
     # the number of the scan that each is a part of. ``per``: the unit by which A divides.
     require_channel_method(channel, method)
-    owners = tuple(owners or range(len(scans)))
+    owners = owners or range(len(scans))
     apart = None
     if centre != PER_REPEAT:
         estimate = require_profile(scans, stresses, channel, owners, per)
@@ -65,7 +65,7 @@ def solve(
         try:
             separate, numbers = points.scans_of_repeats(scans, channel)
             of_repeats = [stresses[i] for i in numbers]
-            parts = tuple(owners[i] for i in numbers)
+            parts = [owners[i] for i in numbers]
             estimate = require_profile(separate, of_repeats, channel, parts, per)
             scans = separate
             stresses = of_repeats
@@ -93,7 +93,7 @@ def solved(
     fields = prepare_fields(estimate, smoothed, choice, divided=not isinstance(method, Bayesian))
     band = beyond_zeros(band, estimate, fields.grid.wavenumber, fields.voltage.transform)
     gaussian = _misfit(estimate, estimate.gaussian.predicted)
-    steps = (tuple(scans), tuple(stresses), estimate, smoothed, band, choice, fields, method)
+    steps = (scans, stresses, estimate, smoothed, band, choice, fields, method)
     return Solution(*steps, deconvolve(estimate, band, fields, method), gaussian)
 
 
@@ -233,8 +233,8 @@ class Deconvolution:
 class Solution:
     """Every step of a calibration."""
 
-    scans: tuple[Scan, ...]
-    stresses: tuple[BaseStress, ...]  # the reference of each scan
+    scans: Sequence[Scan]
+    stresses: Sequence[BaseStress]  # the reference of each scan
     estimate: ProfileEstimate  # centre, baseline, noise, and the posterior of the profile
     smoothed: SmoothedProfile | None  # the profile that is divided; none of a shear
     band: Band  # signal and noise of the voltage's transform
@@ -243,7 +243,7 @@ class Solution:
     method: Method
     deconvolution: Deconvolution  # A and G by the method, and their misfit
     gaussian_misfit: Misfit  # the Gaussian fitted in data space against the scan
-    owners: tuple[int, ...] = (0,)  # which of the scans that were given each is, or is a repeat of
+    owners: Sequence[int] = (0,)  # which of the scans that were given each is, or is a repeat of
     apart: CentresApart | None = None  # test of a common centre for the repeats, where it was made
 
     @property
@@ -259,6 +259,12 @@ class Solution:
             return None
         other = WhiteNoise() if isinstance(self.method, Bayesian) else Bayesian()
         return deconvolve(self.estimate, self.band, self.fields, other)
+
+    @property
+    def transfer(self) -> ArrayPair:
+        """Wavenumbers along an axis, in rad/m, and the modulus of the transfer function there."""
+        k, spectrum = self.fields.grid.axis_transfer(self.deconvolution.quotient.values)
+        return k, floats(abs(spectrum) / self.deconvolution.conversion_constant)
 
     @property
     def on_films(self) -> bool:

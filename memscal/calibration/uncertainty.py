@@ -378,8 +378,10 @@ def slow_noise_text(estimate: ProfileEstimate, slow: SlowNoise, results: Results
     parameters = results.parameters
     rows = [parameters.names.index(name) for name in MOVED[:2]]
     numbers = results.by_voltage[rows]
-    found = np.sum(replace(estimate, slow=slow).scattered(numbers) ** 2, axis=1)
-    white = np.sum(replace(estimate, slow=None).scattered(numbers) ** 2, axis=1)
+    found, white = (
+        np.sum(replace(estimate, slow=kind).scattered(numbers) ** 2, axis=1)
+        for kind in (slow, None)
+    )
     counted = found if estimate.slow else white
     others = np.maximum(np.diag(parameters.covariance)[rows] - counted, 0.0)
     a, sigma = np.sqrt((others + found) / (others + white))
@@ -534,14 +536,13 @@ def _nuisances(points: ScanPoints) -> tuple[list[str], FloatArray]:
     free = points.free
     suffixes = [_suffix(i) for i in range(len(free))]
     names = [("centre", "centre_y")[axis] + suffixes[i] for i, axis in np.argwhere(free)]
-    scales = [1.0] * len(names)
     for directions, suffix in zip(free, suffixes, strict=True):
-        # The drift is stated across the whole range; its coefficient spans half of it.
-        along = [("drift", "drift_y")[axis] + suffix for axis in np.flatnonzero(directions)]
-        names += ["baseline" + suffix, *along]
-        scales += [1.0, *(2.0 for _ in along)]
+        names.append("baseline" + suffix)
+        names += [("drift", "drift_y")[axis] + suffix for axis in np.flatnonzero(directions)]
     names += [CURVATURE + _suffix(i) for i in points.curved]
-    return names, np.array(scales + [1.0] * points.curved.size)
+    # The drift is stated across the whole range; its coefficient spans half of it.
+    scales = [2.0 if name.startswith("drift") else 1.0 for name in names]
+    return names, np.array(scales)
 
 
 def _kernel_derivatives(
@@ -568,6 +569,8 @@ def _posterior_kernel(
     estimate: ProfileEstimate, deconvolution: Deconvolution, wavenumbers: FloatArray
 ) -> _Derivatives:
     """Derivatives of A, G and its transfer function, by the posterior's parameters."""
+    from scipy.interpolate import make_interp_spline
+
     basis = estimate.basis
     k = estimate.model.k
     a = deconvolution.conversion_constant
@@ -575,10 +578,7 @@ def _posterior_kernel(
     # Normalised: a change of A G by dK changes G by (dK - G dA) / A.
     normalised = (basis.kernels(k) - np.outer(estimate.kernel / a, basis.integrals)) / a
     radial = (basis.radial(r) - np.outer(estimate.radial(r) / a, basis.integrals)) / a
-    place = np.interp(wavenumbers, k, np.arange(k.size))
-    below = np.minimum(place.astype(np.intp), k.size - 2)
-    share = (place - below)[:, None]
-    transfer = (1 - share) * normalised[below] + share * normalised[below + 1]
+    transfer = make_interp_spline(k, normalised, k=1)(np.clip(wavenumbers, k[0], k[-1]))
     rows = np.vstack([basis.integrals, radial, transfer])
     return _Derivatives(rows @ estimate.weighed.gain, rows, np.zeros((len(rows), 0)))
 

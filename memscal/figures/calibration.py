@@ -86,8 +86,8 @@ def draw_radial_log(axes: Axes, data: ApparatusData) -> None:
     axes.set_yscale("log")
     peak = _peak(radial)
     inside = radial.r <= _shown_radius(radial)
-    smallest = np.min(np.maximum(radial.g_gaussian[inside], 10**-_LOG_DECADES * peak))
-    floor = max(0.3 * smallest, 10**-_LOG_DECADES * peak)
+    least = 10**-_LOG_DECADES * peak
+    floor = max(0.3 * radial.g_gaussian[inside].min(), least)
     _draw_profiles(axes, data, floor=0.1 * floor)
     axes.set_ylim(floor / PER_MM2, 3 * peak / PER_MM2)
     axes.set_xlabel(ALONG_RADIUS)
@@ -112,8 +112,16 @@ def draw_transfer(axes: Axes, data: ApparatusData) -> None:
     axes.plot(k, window, ":", color=WINDOW, label="window")
     if limit < end:
         axes.axvspan(0.0, limit, color=REFERENCE, alpha=0.10, lw=0)
-        hatched = axes.axvspan(limit, end, facecolor="0.95", edgecolor="0.75", hatch="////", lw=0)
-        hatched.set(zorder=0, label="extrapolated")
+        axes.axvspan(
+            limit,
+            end,
+            facecolor="0.95",
+            edgecolor="0.75",
+            hatch="////",
+            lw=0,
+            zorder=0,
+            label="extrapolated",
+        )
         axes.axvline(limit, color="0.25", lw=0.8, label=f"resolved to {limit:.3g} rad/mm")
     axes.set_xlim(0.0, end)
     axes.set_ylim(0.0, max(1.1, min(1.1 * _largest(modulus), 3.0)))
@@ -140,12 +148,12 @@ def _shown_radius(radial: ApparatusRadial) -> float:
     """Return the radius to draw up to: where G, or its Gaussian, has died away."""
     peak = _peak(radial)
     last = float(radial.r[-1])
-    alive = np.flatnonzero(np.maximum(abs(radial.g), radial.g_gaussian) > 1e-3 * peak)
-    gaussian_alive = np.flatnonzero(radial.g_gaussian > 1e-3 * peak)
-    if not alive.size or not gaussian_alive.size:
+    alive = radial.r[np.maximum(abs(radial.g), radial.g_gaussian) > 1e-3 * peak]
+    gaussian_alive = radial.r[radial.g_gaussian > 1e-3 * peak]
+    if not gaussian_alive.size:
         return last
     # Ripples of a poor deconvolution reach far; the Gaussian bounds the sensor.
-    far = min(radial.r[alive[-1]], 1.6 * radial.r[gaussian_alive[-1]])
+    far = min(alive[-1], 1.6 * gaussian_alive[-1])
     return min(1.1 * far, last) or last
 
 

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.patches import Rectangle
 
 from memscal.estimation.points import loads_differ
 from memscal.figures.style import (
@@ -85,7 +84,7 @@ def draw_scan_log(axes: Axes, data: ApparatusData, loads: Loads) -> None:
         points = _draw_measured(axes, part, signal, look, load or "_points")
         if load and len(named) < MOST_PANELS:
             named.append(points)
-        if np.any(np.isfinite(limit)):
+        if np.isfinite(limit).any():
             x = part.reconvolution.x
             limits += axes.plot(
                 x / MM,
@@ -168,7 +167,7 @@ def _draw_predictions(axes: Axes, data: ApparatusData, *, net: bool = False) -> 
     background = _background(data, scan.x) if net else np.zeros(scan.x.shape)
     gaps = np.diff(np.unique(scan.x))
     # Moved to one centre, repeats stand beside each other; a single pass does not.
-    interleaved = _aligned(data) and np.min(gaps) < 0.3 * np.median(gaps)
+    interleaved = _aligned(data) and gaps.min() < 0.3 * np.median(gaps)
     mixed = scan.offset_x is not None or _joint(data) or interleaved
     for u, colour, label, dashes, marker in (
         (scan.u_zz_predicted, DECONVOLVED, "reconvolved, G", "-", "o"),
@@ -178,18 +177,18 @@ def _draw_predictions(axes: Axes, data: ApparatusData, *, net: bool = False) -> 
         if net:
             curve = _turned(data, x) * curve
             curve = np.where(curve > 0, curve, np.nan)
-        (line,) = axes.plot(x / MM, curve / data.reading.scale, dashes, label=label, zorder=3)
-        line.set_color(colour)
+        curve = curve / data.reading.scale
+        (line,) = axes.plot(x / MM, curve, dashes, color=colour, label=label, zorder=3)
         if mixed or np.any(np.diff(x) <= 0):  # many voltages near one x, which no line joins
-            line.set(linestyle="none", marker=marker, rasterized=True)
-            line.set_markersize(1.2 if x.size > SCATTER_THRESHOLD else 2.5)
+            size = 1.2 if x.size > SCATTER_THRESHOLD else 2.5
+            line.set(linestyle="none", marker=marker, markersize=size, rasterized=True)
 
 
 def _as_curve(x: FloatArray, u: FloatArray) -> ArrayPair:
     """Return positions in order with one value for each, where repeats agree; else as given."""
     places, inverse = np.unique(x, return_inverse=True)
     mean = np.bincount(inverse, weights=u) / np.bincount(inverse)
-    agree = np.max(abs(u - mean[inverse])) <= 1e-3 * np.ptp(u)
+    agree = abs(u - mean[inverse]).max() <= 1e-3 * np.ptp(u)
     return (places, mean) if agree else (x, u)
 
 
@@ -264,17 +263,9 @@ def _draw_indenter(axes: Axes, data: ApparatusData) -> None:
     if radius is None:
         return
     left = (_centre(data) - radius) / MM
-    patch = Rectangle(
-        (left, 0.0),
-        2 * radius / MM,
-        0.035,
-        transform=axes.get_xaxis_transform(),
-        facecolor="black",
-        lw=0,
-        zorder=4,
-        label=f"{form}, diameter {2 * radius / MM:.3g} mm",
-    )
-    axes.add_patch(patch)
+    diameter = 2 * radius / MM
+    label = f"{form}, diameter {diameter:.3g} mm"
+    axes.axvspan(left, left + diameter, ymax=0.035, color="black", lw=0, zorder=4, label=label)
 
 
 def _stress_axis(axes: Axes, data: ApparatusData, *, baseline: float) -> None:
@@ -326,7 +317,7 @@ def _background(data: ApparatusData, x: FloatArray) -> FloatArray:
     level = np.full(x.shape, _baseline(data))
     length = np.ptp(along)
     if "drift" in data.parameters and length > 0 and not _by_distance(data):
-        middle = (np.max(along) + np.min(along)) / 2
+        middle = (along.max() + along.min()) / 2
         level += data.parameters["drift"] * (x - middle) / length
         if "baseline_curvature" in data.parameters:
             level += data.parameters["baseline_curvature"] * (2 * (x - middle) / length) ** 2
@@ -341,7 +332,7 @@ def _bars(data: ApparatusData) -> FloatArray:
 def _limit_to_scan(axes: Axes, x: FloatArray) -> None:
     """Show the positions (m) of the scan, whatever the reference reaches."""
     margin = 0.03 * np.ptp(x) or MM
-    axes.set_xlim((np.min(x) - margin) / MM, (np.max(x) + margin) / MM)
+    axes.set_xlim((x.min() - margin) / MM, (x.max() + margin) / MM)
 
 
 def draw_residuals(axes: Axes, data: ApparatusData, loads: Loads) -> None:
@@ -351,7 +342,7 @@ def draw_residuals(axes: Axes, data: ApparatusData, loads: Loads) -> None:
     with_g, with_gaussian, scale = standardised(scan)
     # One outlier cannot stretch the axis.
     sizes = np.abs([with_g, with_gaussian])
-    limit = max(3.5, min(1.1 * np.max(sizes), 2.0 * np.quantile(sizes, 0.9)))
+    limit = max(3.5, min(1.1 * sizes.max(), 2.0 * np.quantile(sizes, 0.9)))
     draw_residual_band(axes)
     many = x.size > SCATTER_THRESHOLD
     common = {

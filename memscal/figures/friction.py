@@ -75,8 +75,7 @@ def _draw_maxima(axes: Axes, comparison: FrictionComparison, loading: str) -> No
     for i in np.flatnonzero(shown):
         mu = comparison.friction[i]
         drawn[mu] = curves[:, i]
-        (line,) = axes.plot(loads, drawn[mu], color=friction_colour(mu), lw=0.9)
-        line.set_gid(f"mu={mu:g}")
+        axes.plot(loads, drawn[mu], color=friction_colour(mu), lw=0.9, gid=f"mu={mu:g}")
     for lubrication in dict.fromkeys(at_load.lubrication for at_load in compared):
         measured = [at_load for at_load in compared if at_load.lubrication == lubrication]
         axes.errorbar(
@@ -117,7 +116,7 @@ def _name_curves(axes: Axes, loads: list[float], curves: Mapping[float, FloatArr
         axes.set_xticks([tick for tick in axes.get_xticks() if 0 <= tick <= last])
         look |= {"xytext": (-7, 0), "ha": "right"}
     for group in groups:
-        height = np.mean(group[:, 0])
+        height = group[:, 0].mean()
         low = group[:, 1].min()
         high = group[:, 1].max()
         name = f"≥ {low:.3g}" if np.isinf(high) else f"{low:.3g}–{high:.3g}"
@@ -231,8 +230,7 @@ def _draw_reading(axes: Axes, reading: BoundedEstimate, x: float, label: str, lo
     """Draw a value with its interval; where there is none, the open interval as an arrow."""
     colour = look["color"]
     low, high = interval_ends(reading)
-    (bar,) = axes.plot([x, x], [low, high], color=colour, lw=1.0, solid_capstyle="butt")
-    bar.set_gid("interval")
+    axes.plot([x, x], [low, high], color=colour, lw=1.0, solid_capstyle="butt", gid="interval")
     cap = {"marker": "_", "ls": "none", "color": colour, "ms": 5, "mew": 1.0}
     if reading.interval.low > 0:
         axes.plot(x, low, **cap)
@@ -241,8 +239,8 @@ def _draw_reading(axes: Axes, reading: BoundedEstimate, x: float, label: str, lo
     else:
         axes.plot(x, high, **cap)
     if reading.value is not None:
-        (value,) = axes.plot(x, friction_position(reading.value), ms=4, mew=0.8, **look)
-        value.set(ls="none", zorder=3, label="_value")
+        place = friction_position(reading.value)
+        axes.plot(x, place, ms=4, mew=0.8, ls="none", zorder=3, label="_value", **look)
     if label:
         axes.plot([], [], look["marker"], color=colour, ms=4, ls="-", lw=1.0, label=label)
 

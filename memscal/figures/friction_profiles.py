@@ -285,14 +285,12 @@ def friction_set_figure(comparison: FrictionComparison, lubrication: str) -> Fig
         panels[2, 0].set_ylabel("residual / $u$")
         figure.align_ylabels(panels[:, 0])
         first = loads[0]
-        point = Line2D([], [], ms=3, ls="none", **mark(first.lubrication, "k"))
-        point.set_label(f"measured, {lubricated_words(first.lubrication)}")
-        handles = [point]
-        for i in _shown_indices(comparison):
-            mu = comparison.friction[i]
-            line = Line2D([], [], color=friction_colour(mu), lw=1.2)
-            line.set_label(rf"$\mu$ = {friction_name(mu)}")
-            handles.append(line)
+        label = f"measured, {lubricated_words(first.lubrication)}"
+        look = mark(first.lubrication, "k")
+        handles = [Line2D([], [], ms=3, ls="none", label=label, **look)]
+        for mu in comparison.friction[_shown_indices(comparison)]:
+            label = rf"$\mu$ = {friction_name(mu)}"
+            handles.append(Line2D([], [], color=friction_colour(mu), lw=1.2, label=label))
         figure.legend(
             handles=handles,
             title=f"{first.loading} loading" if first.loading else "profiles as given",
@@ -305,7 +303,7 @@ def friction_set_figure(comparison: FrictionComparison, lubrication: str) -> Fig
 
 def _shown_indices(comparison: FrictionComparison) -> list[int]:
     """Return indices of the coefficients to draw: some of them, the ends always."""
-    nearest = {int(np.argmin(abs(comparison.friction - mu))) for mu in _SHOWN}
+    nearest = {int(abs(comparison.friction - mu).argmin()) for mu in _SHOWN}
     return sorted(nearest | {0, comparison.friction.size - 1})
 
 
@@ -321,7 +319,7 @@ def _draw_set(
     look = mark(at_load.lubrication, MEASURED) | _BARS
     # As far as the frictionless profile exceeds a twentieth of its top.
     strong = at_load.calculated[0] > 0.05 * at_load.calculated[0].max()
-    r = np.linspace(0.0, profile.r[np.flatnonzero(strong)[-1]], _FINE)
+    r = np.linspace(0.0, profile.r[strong][-1], _FINE)
     for i in _shown_indices(comparison):
         curve = on_axis(profile.r, (at_load.calculated[i] - less)[None, :], r)[0]
         axes.plot(r / MM, curve / unit, color=friction_colour(comparison.friction[i]), lw=0.9)

@@ -186,12 +186,11 @@ _NAMED = 6
 def contact_figure(contact: Contact, *, beside: Sequence[Contact] = ()) -> Figure:
     """Draw pressure and shear of one contact or several; of several, load against depth, too."""
     contacts = [contact, *beside]
-    several = len(contacts) > 1
-    with panels_of(2.9, 1, 3 if several else 2, note="") as (figure, panels):
+    with panels_of(2.9, 1, 3 if beside else 2, note="") as (figure, panels):
         colours = shades(len(contacts), 0.15)
         _draw_interface(panels[0], contacts, colours)
         _draw_base(panels[1], contacts, colours)
-        if several:
+        if beside:
             axes = panels[2]
             depth = np.array([contact.depth for contact in contacts]) / _MICROMETRE
             load = [contact.load for contact in contacts]

@@ -295,7 +295,7 @@ def on_axis(r: FloatArray, values: FloatArray, fine: FloatArray) -> FloatArray:
 
 def marker_size(points: int) -> float:
     """Return a marker size in points that keeps 33 points visible and 400 apart."""
-    return float(min(4.0, max(1.5, 4.0 * (40.0 / max(points, 1)) ** 0.5)))
+    return float(np.clip(4.0 * (40.0 / max(points, 1)) ** 0.5, 1.5, 4.0))
 
 
 # matplotlib writes the time and its own version unless the metadata leave them out.

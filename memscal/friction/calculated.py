@@ -84,9 +84,11 @@ def external_family(
     k = solved.wavenumbers.k
     spectra = []
     for row in grid:
-        transforms = [hankel_transform(cell.r, cell.sigma_zz, k) for cell in row]
-        scales = [load / cell.load for load, cell in zip(nominal, row, strict=True)]
-        spectra.append(np.multiply(transforms, np.reshape(scales, (-1, 1))))
+        members = [
+            load / cell.load * hankel_transform(cell.r, cell.sigma_zz, k)
+            for load, cell in zip(nominal, row, strict=True)
+        ]
+        spectra.append(members)
 
     def numbers(name: str) -> FloatArray:
         """Numbers of all tables, not a number where one is not stated."""

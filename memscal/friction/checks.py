@@ -23,7 +23,7 @@ def comparison_checks(
     joint: Joint,
     *,
     noise_stated: bool = True,
-) -> tuple[QualityCheck, ...]:
+) -> quality.QualityChecks:
     """Return the checks of every load (one loading has to explain it), and those of all loads."""
     # A noise that was estimated from the scatter about a contact is as large as the misfit.
     checks = []
@@ -107,8 +107,8 @@ def comparison_messages(
     measured: MeasuredStress,
     families: Mapping[str, ProfileFamily],
     joint: Joint,
-    checks: tuple[QualityCheck, ...],
-) -> tuple[Message, ...]:
+    checks: quality.QualityChecks,
+) -> quality.Messages:
     """Return the messages of a comparison and of its measured stress, failed checks first."""
     messages = [*quality.failed_check_messages(checks), *synthetic_messages(measured)]
     # Where the definitions of the loading disagree.

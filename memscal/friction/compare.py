@@ -38,7 +38,7 @@ from memscal.friction.results import FrictionComparison, LoadComparison
 from memscal.friction.wrong_inputs import wrong_inputs
 from memscal.measurement.measure_stress import joined_stress, measure_stress
 from memscal.measurement.posterior import common_inputs
-from memscal.measurement.restore import accept_other_sensor, load_of, single_loads
+from memscal.measurement.restore import accept_other_sensor, load_of, place_of, single_loads
 from memscal.mechanics.indent import Loading
 from memscal.model.arrays import Values, require_non_negative
 from memscal.model.checks import Message, override_messages
@@ -60,10 +60,10 @@ def scans_of(contacts: Sequence[Scan | MeasuredStress]) -> list[Scan | MeasuredS
     return scans
 
 
-def require_contacts(scans: Sequence[Scan | MeasuredScan], *, sliding: bool = False) -> None:
+def require_contacts(scans: Sequence[Scan | MeasuredScan], *, sliding: bool) -> None:
     """Refuse what is no scan of a sphere's contacts, or not all on one film with one sphere."""
     for scan in scans:
-        place = scan.source.file_name if scan.source else "The scan"
+        place = place_of(scan)
         if not isinstance(scan.indenter, Sphere):
             problem = f"{place} states no sphere (/entry/indenter)."
             if scan.indenter:
@@ -341,10 +341,8 @@ def _require_macroscopic(
     value: float | None, uncertainty: float | None, *, interface: bool
 ) -> None:
     """Refuse a macroscopic coefficient that is none, or is asked for and not given."""
-    if value is not None:
-        require_non_negative("macroscopic friction coefficient", value)
-    if uncertainty is not None:
-        require_non_negative("uncertainty of the macroscopic coefficient", uncertainty)
+    require_non_negative("macroscopic friction coefficient", value)
+    require_non_negative("uncertainty of the macroscopic coefficient", uncertainty)
     if value is None and (interface or uncertainty is not None):
         raise InputError(
             "The macroscopic friction coefficient is not given.",
@@ -522,12 +520,11 @@ def _loads(
 ) -> dict[str, tuple[LoadComparison, ...]]:
     """Compare each load by each loading; its coefficients are the middle of both."""
     loads = []
-    tested = measured.noise_stated
     for i, profile in enumerate(measured.profiles):
         by_loading = {loading: load_comparison(profile, fit, i) for loading, fit in fits.items()}
         for name in ("by_maximum", "by_profile"):
             read = {loading: getattr(load, name) for loading, load in by_loading.items()}
-            for loading, counted in with_loading(read, tested=tested).items():
+            for loading, counted in with_loading(read, tested=measured.noise_stated).items():
                 change: Values = {name: counted}
                 by_loading[loading] = replace(by_loading[loading], **change)
         loads.append(by_loading)

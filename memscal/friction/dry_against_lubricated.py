@@ -34,12 +34,12 @@ _BY_POINT = ("u", "offset", "log_load", "noise", "load_errors", "x_errors", "fla
 
 def lubricated_pairs(profiles: Sequence[MeasuredProfile]) -> list[tuple[int, int]]:
     """Return the indices of dry and lubricated profiles of one load."""
-    pairs = []
-    for (i, dry), (j, lubricated) in product(enumerate(profiles), repeat=2):
-        kinds = (dry.lubrication, lubricated.lubrication)
-        if kinds == ("dry", "lubricated") and abs(dry.load / lubricated.load - 1) < _SAME_LOAD:
-            pairs.append((i, j))
-    return pairs
+    return [
+        (i, j)
+        for (i, dry), (j, lubricated) in product(enumerate(profiles), repeat=2)
+        if (dry.lubrication, lubricated.lubrication) == ("dry", "lubricated")
+        and abs(dry.load / lubricated.load - 1) < _SAME_LOAD
+    ]
 
 
 def dry_against_lubricated(
@@ -90,7 +90,7 @@ def dry_against_lubricated(
     # What each scan has for itself, its gain and load, on the axis as nearest to it.
     own = np.concatenate([columns["between_scan_gain"], columns["load"]], axis=-1)[0]
     by_scan = np.linalg.norm(own, axis=1) / sensor.conversion_constant
-    on_axis = by_scan[np.argmin(dry.radius)]
+    on_axis = by_scan[dry.radius.argmin()]
     maximum_uncertainty = math.hypot(
         conversion_share * maximum, on_axis, *map(random_uncertainty, budgets)
     )

@@ -124,7 +124,7 @@ class FrictionFit:
         if estimate.value is not None:
             stretch = _stretch(estimate.value, family.scale)
             shares = at(estimate.value).budget()
-            budget = {source: float(stretch * share) for source, share in shares.items()}
+            budget = {source: stretch * share for source, share in shares.items()}
             # The likelihood is no parabola: the shares of its slope add up to its width.
             u = estimate.standard_uncertainty
             whole = math.hypot(*budget.values())
@@ -152,7 +152,7 @@ def fit_friction(channel: Channel, *shear: Channel) -> FrictionFit:
 
 def _stretch(value: float, scale: float) -> float:
     """Return the derivative of a coefficient by its bounded coordinate."""
-    return float(scale / (1 - bounded(value, scale)) ** 2)
+    return (value + scale) ** 2 / scale
 
 
 #: Standard deviation of half a normal distribution over its width, and mean over the former.
@@ -253,9 +253,7 @@ def load_comparison(profile: MeasuredProfile, fit: FrictionFit, index: int) -> L
     # G convolved with each base stress, at the points and on the axis; A is not uncertain in it.
     places = points_at(np.append(profile.r, 0.0), points)
     blurred = predict(places, sensor.with_exact_constant(), family, index)
-    variance = np.zeros_like(blurred.signal)
-    for column in blurred.columns.values():
-        variance += np.sum(column**2, axis=-1)
+    variance = sum(np.sum(column**2, axis=-1) for column in blurred.columns.values())
     stresses = blurred.signal / sensor.conversion_constant
     errors = np.sqrt(variance) / sensor.conversion_constant
     calculated = stresses[:, :-1]

@@ -49,9 +49,7 @@ _ROUNDING = 1e-9
 
 def bounded(values: ArrayLike, scale: float) -> FloatArray:
     """Return the bounded coordinate t of values: 1 where they are infinite."""
-    theta = floats(values)
-    finite = np.where(np.isinf(theta), 0.0, theta)
-    return np.where(np.isinf(theta), 1.0, finite / (finite + scale))
+    return floats(1 - scale / (floats(values) + scale))
 
 
 def unbounded(coordinates: ArrayLike, scale: float) -> FloatArray:
@@ -216,26 +214,25 @@ def _solve(path: LoadingPath, k: FloatArray) -> Arrays:
     visited = [loads]
     if path.derivatives:
         visited += [factor * loads for factor in _NEIGHBOURS]
-    order = np.argsort(visited, axis=None, kind="stable")
-    solved = path.contacts(np.ravel(visited)[order])
-    contacts = [solved[place] for place in np.argsort(order)]
+    increasing, places = np.unique(visited, return_inverse=True)
+    solved = np.array(path.contacts(increasing), dtype=object)
+    nominal, *neighbours = solved[places.reshape(-1, loads.size)]
 
-    def spectra_of(group: int, k: FloatArray) -> FloatArray:
-        """Spectra at the loads, or at a group of their neighbours."""
-        some = contacts[group * loads.size : (group + 1) * loads.size]
+    def spectra_of(contacts: Sequence[Any], k: FloatArray = k) -> FloatArray:
+        """Spectra of contacts at the loads, or at a group of their neighbours."""
         spectrum = "base_shear_spectrum" if path.order else "base_spectrum"
-        return np.array([getattr(contact, spectrum)(k) for contact in some])
+        return np.array([getattr(contact, spectrum)(k) for contact in contacts])
 
-    spectra = spectra_of(0, k)
+    spectra = spectra_of(nominal)
     by_load = np.zeros_like(spectra)
     by_wavenumber = np.zeros_like(spectra)
     if path.derivatives:
         # By P d/dP and not by the logarithm's own step: the force is then met exactly.
-        by_load = (spectra_of(2, k) - spectra_of(1, k)) / (_NEIGHBOURS[1] - _NEIGHBOURS[0])
-        above = spectra_of(0, k * (1 + _STRETCH))
-        below = spectra_of(0, k * (1 - _STRETCH))
+        lighter, heavier = map(spectra_of, neighbours)
+        by_load = (heavier - lighter) / (_NEIGHBOURS[1] - _NEIGHBOURS[0])
+        above = spectra_of(nominal, k * (1 + _STRETCH))
+        below = spectra_of(nominal, k * (1 - _STRETCH))
         by_wavenumber = (above - below) / (2 * _STRETCH)
-    nominal = contacts[: loads.size]
     return {
         "spectra": spectra,
         "by_load": by_load,

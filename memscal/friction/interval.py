@@ -31,7 +31,7 @@ def profile_estimate(
 
     spline = CubicSpline(coordinates, deviance)
     # The lowest point of the spline next to the lowest node.
-    i = np.argmin(deviance)
+    i = deviance.argmin()
     around = coordinates[max(i - 1, 0) : i + 2]
     turns = spline.derivative().roots(extrapolate=False)
     turns = turns[(around[0] < turns) & (turns < around[-1])]
@@ -40,7 +40,7 @@ def profile_estimate(
 
     def interval_of(level: float) -> Interval:
         """Values whose -2 ln p is no larger than the level allows."""
-        top = lowest + float(chdtri(1, 1 - level))
+        top = lowest + chdtri(1, 1 - level)
         crossings = unbounded(spline.solve(top, extrapolate=False), scale)
         # An end that the level allows is beyond what was calculated.
         low = 0.0 if deviance[0] <= top else float(crossings.min())

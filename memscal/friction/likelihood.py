@@ -98,7 +98,7 @@ class LoadPoints:
     @property
     def degrees(self) -> int:
         """Points less flat parameters."""
-        return int(self.u.size - self.flat.shape[1]) - int(self.free_centre)
+        return int(self.u.size - self.flat.shape[1] - self.free_centre)
 
 
 #: Positions that spread across a line by less than this share of its length are on it.
@@ -179,11 +179,15 @@ def points_of(
     for profile in profiles:
         cell = profile.scan.load_cell
         cells.append(cell.serial_number or cell.name or id(profile.scan))
-    points = []
-    for profile, scan, load_cell in zip(profiles, scans, indicators(cells), strict=True):
-        own = {"own_gain": between_scan_gain, "scan": scan, "load_cell": load_cell}
-        points.append(replace(load_points(profile, channel), **own))
-    return points
+    return [
+        replace(
+            load_points(profile, channel),
+            own_gain=between_scan_gain,
+            scan=scan,
+            load_cell=load_cell,
+        )
+        for profile, scan, load_cell in zip(profiles, scans, indicators(cells), strict=True)
+    ]
 
 
 def indicators(keys: Sequence[Hashable]) -> FloatArray:
@@ -314,8 +318,7 @@ def predict(points: LoadPoints, sensor: Sensor, members: ProfileFamily, load: in
         """Inverse transforms (V, n) of spectra (V, K)."""
         return sign * (spectra @ kernel.T)[:, place]
 
-    transfer = sensor.transfer
-    slope = at_points(transfer * members.spectra[:, load], derivative * weights * k)
+    slope = at_points(sensor.transfer * members.spectra[:, load], derivative * weights * k)
     return changes_at(points, sensor, members, load, at_points, slope)
 
 
@@ -384,7 +387,7 @@ def stacked(normal: Readings, shear: Readings) -> Readings:
         own = np.eye(channel.u.size) if channel.correlation is None else channel.correlation
         correlations.append(own)
         # A contact is known by its place, and by which of those there it is.
-        count: Counter[float] = Counter()
+        count = Counter[float]()
         for place in channel.offset.round(12).tolist():
             contacts.append((place, count[place]))
             count[place] += 1
@@ -526,11 +529,11 @@ class Likelihood:
 
     values: FloatArray
     coordinates: FloatArray
-    loads: tuple[Standardised, ...]
+    loads: Sequence[Standardised]
 
     def only(self, chosen: Sequence[int]) -> Likelihood:
         """Return the likelihood of some of the loads."""
-        return replace(self, loads=tuple(self.loads[i] for i in chosen))
+        return replace(self, loads=[self.loads[i] for i in chosen])
 
     def with_held(self, held: Likelihood, spread: float) -> Likelihood:
         """Add loads that are held at one value; all share systematic errors.
@@ -541,7 +544,7 @@ class Likelihood:
         for load in held.loads:
             moved = load.with_lubricated_friction(spread)
             loads.append(replace(moved, slope=np.zeros_like(load.slope)))
-        return replace(self, loads=tuple(loads))
+        return replace(self, loads=loads)
 
     def averaged_over(self, held: Likelihood, weights: FloatArray) -> ArrayTriple:
         """Average the likelihood over values (W,) of other loads; all share systematic errors.
@@ -634,4 +637,4 @@ def likelihood(channel: Channel, *shear: Channel) -> Likelihood:
     for i in range(len(channel.points)):
         both = [each.readings(i) for each in (channel, *shear)]
         loads.append(standardise(*reduce(stacked, both)))
-    return Likelihood(channel.family.values, channel.family.coordinates, tuple(loads))
+    return Likelihood(channel.family.values, channel.family.coordinates, loads)

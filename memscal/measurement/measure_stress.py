@@ -83,9 +83,9 @@ def pooled_force(profiles: Sequence[MeasuredProfile]) -> tuple[float, float]:
     # w'(diag(u^2) + cc')w.  The load's common uncertainty counts, that of single loads does not.
     budgets = [_relative(profile) for profile in profiles]
     scan = np.array([budget["scan"] for budget in budgets])
-    weight = scan**-2 / np.sum(scan**-2)
+    variance = 1 / np.sum(scan**-2)
+    weight = variance * scan**-2
     ratio = np.array([profile.force / profile.load for profile in profiles])
-    variance = np.sum((weight * scan) ** 2)
     for source in SHARED_SOURCES:
         variance += (weight @ [budget.get(source, 0.0) for budget in budgets]) ** 2
     return float(weight @ ratio), math.sqrt(variance)

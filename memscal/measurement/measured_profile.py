@@ -11,7 +11,7 @@ only where the scan does not determine it.
 import math
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
@@ -25,7 +25,7 @@ from memscal.estimation.points import TANGENTIAL, ScanPoints, measured_mask, mea
 from memscal.estimation.profile import NUMERICAL_FLOOR, ProfileEstimate, stated_weights
 from memscal.estimation.voltage_map import square_root
 from memscal.extensions import hook
-from memscal.measurement.posterior import columns_of, film_transfer, sensor_changes, shared_changes
+from memscal.measurement.posterior import columns_of, sensor_changes, shared_changes
 from memscal.measurement.restoration import Restoration
 from memscal.measurement.restore import gaussian_pressure, load_of, undetermined, unit_force
 from memscal.mechanics.contact import Contact
@@ -33,7 +33,7 @@ from memscal.mechanics.indent import indent
 from memscal.mechanics.interface import Interface
 from memscal.mechanics.solver.refinement import RingRequest, solve_on_rings
 from memscal.mechanics.solver.step import Load
-from memscal.model.arrays import Arrays, FloatArray, array_record
+from memscal.model.arrays import Arrays, FloatArray, Values, array_record
 from memscal.model.correlation import is_banded
 from memscal.model.indenter import Rod
 from memscal.model.measured_stress import MeasuredPoints, MeasuredProfile, MeasuredScan
@@ -113,7 +113,7 @@ def _signals_of_path(loads: Sequence[Scan], apparatus: ApparatusFunction) -> lis
 
 def _width(scan: Scan) -> float:
     """Width of a line, or diagonal of a raster, in m."""
-    return float(np.hypot(np.ptp(scan.x), 0.0 if scan.y is None else np.ptp(scan.y)))
+    return math.hypot(np.ptp(scan.x), 0.0 if scan.y is None else np.ptp(scan.y))
 
 
 def _path(scan: Scan, loads: FloatArray, friction: float) -> Sequence[Contact]:
@@ -165,14 +165,12 @@ def require_ends(scan: Scan, signal: ContactSignal, centre: FloatArray) -> None:
         axes = [(scan.x[measured], centre[0 if scan.direction == "x" else 1])]
     else:
         axes = [(scan.x, centre[0]), (scan.y, centre[1])]
-    ends: list[float] = []
-    for axis, middle in axes:
-        ends += np.abs([axis.min() - middle, axis.max() - middle]).tolist()
+    ends = np.abs([[axis.min() - middle, axis.max() - middle] for axis, middle in axes]).ravel()
     calculated = signal.voltage[0]
     left = np.interp(ends, signal.r, calculated).max() / calculated.max()
     if left > _LARGEST_END:
         raise FitError(
-            f"{load_of(scan)}: the scan ends {min(ends) * 1e3:.3g} mm from its centre, "
+            f"{load_of(scan)}: the scan ends {ends.min() * 1e3:.3g} mm from its centre, "
             f"where the calculated profile still has {left:.0%} of its maximum.",
             why="The voltage never comes down to the baseline, so that it cannot be told from the "
             "stress.",
@@ -198,7 +196,7 @@ class _Found:
 
 
 def _found(scan: Scan, apparatus: ApparatusFunction) -> _Found:
-    estimate, _ = gaussian_pressure(scan, apparatus)
+    estimate = gaussian_pressure(scan, apparatus)
     return _Found(
         estimate.centre,
         estimate.distance,
@@ -213,7 +211,7 @@ def _found(scan: Scan, apparatus: ApparatusFunction) -> _Found:
 def _found_quickly(scan: Scan, apparatus: ApparatusFunction) -> _Found:
     # Without departures, in a tenth of the time.
     points = measured_points(scan)
-    model = forward_model(points, [unit_force(scan, apparatus, points)[0]])
+    model = forward_model(points, [unit_force(scan, apparatus, points)])
     with undetermined():
         fit = fit_gaussian_to_points(model, stated_weights(points))
     signal = fit.conversion_constant * fit.jacobian[:, 0]
@@ -262,7 +260,7 @@ def prepared_scan(scan: Scan, apparatus: ApparatusFunction, signal: ContactSigna
 def _slope(signal: ContactSignal, found: _Found) -> FloatArray:
     """Derivative of the voltage by ln of the load, in V, between no friction and full stick."""
     # As far as the voltage nearest to the axis is from the one to the other.
-    nearest = np.argmin(found.distance)
+    nearest = found.distance.argmin()
     free, stuck = (np.interp(found.distance[nearest], signal.r, u) for u in signal.voltage)
     sticking = 0.0
     if stuck > free:
@@ -311,25 +309,16 @@ def _electronic_noise(found: _Found, load_noise: FloatArray) -> float:
 
 def measured_scan(scan: Scan) -> MeasuredScan:
     """Return film, indenter, sensor and the other data of a scan without its points."""
-    return MeasuredScan(
-        film=scan.set_up.film,
-        indenter=scan.set_up.indenter,
-        sensor=scan.sensor,
-        load_cell=scan.load_cell,
-        stage=scan.stage,
-        width=_width(scan),
-        lubrication=scan.lubrication,
-        motion=scan.motion,
-        speed=hook("sliding_speed")(scan) if scan.motion == "sliding" else scan.speed,
-        sliding_friction=scan.sliding_friction,
-        sliding_friction_uncertainty=scan.sliding_friction_uncertainty,
-        position_scale_uncertainty=scan.position_scale_uncertainty,
-        gain_uncertainty=scan.gain_uncertainty,
-        position_errors_by_repeat=scan.position_errors_by_repeat,
-        synthetic=bool(scan.synthetic),
-        source=scan.source,
-        unit="" if scan.unit == "V" else scan.unit,
-    )
+    alike: Values = {item.name: getattr(scan, item.name, None) for item in fields(MeasuredScan)}
+    own = {
+        "film": scan.set_up.film,
+        "indenter": scan.set_up.indenter,
+        "width": _width(scan),
+        "speed": hook("sliding_speed")(scan) if scan.motion == "sliding" else scan.speed,
+        "synthetic": bool(scan.synthetic),
+        "unit": "" if scan.unit == "V" else scan.unit,
+    }
+    return MeasuredScan(**(alike | own))
 
 
 def measured_profile(
@@ -456,8 +445,7 @@ def _place_roots(restored: Restoration, average: Any) -> Arrays:
     """Roots of the covariance that centre, baseline and drift bring, shared out without a rest."""
     posterior = restored.posterior
     model = posterior.estimate.model
-    film = film_transfer(restored.scan.set_up.expected, model.reference.wavenumbers)
-    pressure = posterior.stress / restored.scan.stated_load / film
+    pressure = posterior.stress / restored.scan.stated_load / posterior.film
     a = restored.apparatus.conversion_constant
     geometry = model.geometry(restored.centre)
     by_centre = average @ model.centre_derivative(geometry, pressure) / a

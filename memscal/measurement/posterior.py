@@ -133,11 +133,11 @@ def _shear_ratio(film: ElasticFilm, k: bytes) -> FloatArray:
     return by_shear / by_pressure
 
 
-def pressure_shapes(film: ElasticFilm) -> tuple[PressureShape, ...]:
+def pressure_shapes(film: ElasticFilm) -> list[PressureShape]:
     """Return the shapes that a restoration averages."""
     # Above a Poisson's ratio of 0.4 a pressed film flows outward under the indenter.
     shears = _SHEARS_INCOMPRESSIBLE if film.poisson_ratio > 0.4 else _SHEARS_COMPRESSIBLE
-    return tuple(PressureShape(m, c, film) for m in _EXPONENTS for c in shears)
+    return [PressureShape(m, c, film) for m in _EXPONENTS for c in shears]
 
 
 #: A fit diverges if its width is this many times the Gaussian's, or that fraction of it.
@@ -201,8 +201,9 @@ def _averaged_shapes(scan: Scan, start: ProfileEstimate) -> _PressureEstimate:
     kept = np.flatnonzero(weight >= _NEGLIGIBLE)
     fits = [_averaged_departures(start, weighed[i]) for i in kept]
     shares = weight[kept] / weight[kept].sum()
-    mean = shares @ np.stack([fit.state for fit in fits])
-    apart = np.stack([fit.state - mean for fit in fits], axis=1) * np.sqrt(shares)
+    states = np.stack([fit.state for fit in fits])
+    mean = shares @ states
+    apart = (states - mean).T * np.sqrt(shares)
     pairs = list(zip(shares, fits, strict=True))
     return _PressureEstimate(
         state=mean,
@@ -264,9 +265,8 @@ def fitted_shapes(shapes: Sequence[PressureShape], start: ProfileEstimate) -> li
     widths = np.where(settled, widths, width)
     columns = np.moveaxis(_shape_columns(shapes, start, forces, widths), 1, 0)
     background = start.model.drift_columns @ gaussian.drift
-    fits = []
-    for force, width, jacobian in zip(forces, widths, columns, strict=True):
-        fit = replace(
+    return [
+        replace(
             gaussian,
             conversion_constant=float(force),
             sigma=float(width),
@@ -274,8 +274,8 @@ def fitted_shapes(shapes: Sequence[PressureShape], start: ProfileEstimate) -> li
             jacobian=jacobian,
             predicted=force * jacobian[:, 0] + background,
         )
-        fits.append(fit)
-    return fits
+        for force, width, jacobian in zip(forces, widths, columns, strict=True)
+    ]
 
 
 def _shape_columns(
@@ -284,10 +284,9 @@ def _shape_columns(
     """Derivatives of the voltages by force, width, centre and drift, (n, shapes, p)."""
     model = start.model
     geometry = start.gaussian.geometry
-    kernels = np.zeros((model.k.size, len(shapes)))
-    slopes = np.zeros_like(kernels)
-    for i, (shape, width) in enumerate(zip(shapes, widths, strict=True)):
-        kernels[:, i], slopes[:, i] = shape.transform(model.k, width)
+    pairs = zip(shapes, widths, strict=True)
+    transforms = np.array([shape.transform(model.k, width) for shape, width in pairs])
+    kernels, slopes = transforms.transpose(1, 2, 0)
     signal, widening = np.hsplit(model.signal(geometry, np.hstack([kernels, slopes])), 2)
     centre = [model.centre_derivative(geometry, kernel) for kernel in (forces * kernels).T]
     drift = model.drift_columns[:, None]
@@ -312,7 +311,8 @@ class Posterior:
     covariances: Arrays  # (s, s) by source, independent
     shifts: Arrays  # (n, q) by source: change of the voltages, in V
     changes: Arrays  # (s, q) by source: change of the state
-    film_inputs: tuple[str, ...]  # whose uncertainties the columns of source ``film`` are
+    film: FloatArray  # (k,): stress at the base over the pressure on the film, by their transforms
+    film_inputs: Sequence[str]  # whose uncertainties the columns of source ``film`` are
     nodes: int  # how many entries of the state are the transform
     first_drift: int  # place of the baseline, behind the free centre
     residual: FloatArray  # (n,), in V
@@ -346,10 +346,8 @@ def reach_of(points: ScanPoints) -> float:
     return _REACH * points.span
 
 
-def posterior_of(
-    scan: Scan, apparatus: ApparatusFunction, estimate: ProfileEstimate, transfer: FloatArray
-) -> Posterior:
-    """Average the shapes of pressure and propagate the inputs; ``transfer``: A G's, in V/Pa."""
+def posterior_of(scan: Scan, apparatus: ApparatusFunction, estimate: ProfileEstimate) -> Posterior:
+    """Average the shapes of pressure and propagate the inputs."""
     averaged = _averaged_shapes(scan, estimate)
     mean = averaged.state
     model = estimate.model
@@ -361,9 +359,10 @@ def posterior_of(
     by_film = film_changes(set_up, wavenumbers)
     shared = shared_changes(apparatus, [scan], model.k)
     # One error of a film that sensor and contact share changes A G and the film's transfer.
-    names = tuple(name for name in by_film | shared if name != "load")
+    names = [name for name in by_film | shared if name != "load"]
     of_film = columns_of(by_film, names, nodes)
     of_kernel = columns_of(shared, names, nodes)
+    transfer = apparatus.conversion_constant * sensor_changes(apparatus, model.k)[0]
     together = of_film * transfer[:, None] + of_kernel * film[:, None]
     _, sensor = sensor_changes(apparatus, model.k, shared)
     slope = model.radial_derivative(estimate.gaussian.geometry, mean[:nodes])
@@ -396,6 +395,7 @@ def posterior_of(
         covariances=covariances,
         shifts=shifts,
         changes=changes,
+        film=film,
         film_inputs=names,
         nodes=nodes,
         first_drift=nodes + estimate.points.free.sum(),
@@ -414,13 +414,10 @@ def columns_of(changes: Arrays, names: Sequence[str], count: int) -> FloatArray:
 
 def _signals(estimate: ProfileEstimate, state: FloatArray, changes: FloatArray) -> FloatArray:
     """Voltages of the pressure through changed references, shape (n, q), in V."""
-    kernel = state[: estimate.model.k.size]
     model = estimate.model
-    columns = np.zeros((model.points.u.size, changes.shape[1]))
-    for i, change in enumerate(changes.T):
-        changed = replace(model, references=(RadialSpectrum(model.reference.wavenumbers, change),))
-        columns[:, i] = changed.signal(estimate.gaussian.geometry, kernel)
-    return columns
+    alone = RadialSpectrum(model.reference.wavenumbers, np.ones(model.k.size))
+    kernels = state[: model.k.size, None] * changes
+    return replace(model, references=(alone,)).signal(estimate.gaussian.geometry, kernels)
 
 
 def sensor_changes(
@@ -489,8 +486,8 @@ def alike_films(film: ElasticFilm, other: ElasticFilm) -> bool:
     # What is not stated is not a number.
     values = np.array([getattr(film, name) for name in names], float)
     others = np.array([getattr(other, name) for name in names], float)
-    same = np.isclose(values, others, rtol=1e-6, atol=0.0, equal_nan=True)
-    return film.name == other.name and bool(same.all())
+    same = np.allclose(values, others, rtol=1e-6, atol=0.0, equal_nan=True)
+    return film.name == other.name and same
 
 
 @lru_cache(maxsize=16)
@@ -525,10 +522,9 @@ def film_changes(set_up: SetUp, wavenumbers: Wavenumbers) -> Arrays:
     for name in ("thickness", "poisson_ratio"):
         ends = more_and_less(set_up.film, name)
         if ends:
-            more, less, share = ends
-            upper = film_transfer(set_up._replace(film=more), wavenumbers)
-            lower = film_transfer(set_up._replace(film=less), wavenumbers)
-            changes[name] = share * (upper - lower)
+            *films, share = ends
+            more, less = (film_transfer(set_up._replace(film=f), wavenumbers) for f in films)
+            changes[name] = share * (more - less)
     if law_at_once(set_up.under(NEO_HOOKEAN)) != LINEAR:
         linear = _linear_transfer(set_up, wavenumbers)
         for name, change in law_sensitivities(set_up, linear).items():

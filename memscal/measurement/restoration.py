@@ -1,5 +1,6 @@
 """Restored stress: the stress at the base of the film that explains a scan, and its comparison."""
 
+import math
 from collections.abc import Mapping
 from os import PathLike
 
@@ -12,7 +13,7 @@ from memscal.axisymmetry.hankel import hankel_transform
 from memscal.errors import InputError
 from memscal.estimation.points import ScanPoints
 from memscal.formats.reference import read_reference
-from memscal.measurement.posterior import Posterior, film_transfer, reach_of, sensor_changes
+from memscal.measurement.posterior import Posterior, reach_of, sensor_changes
 from memscal.mechanics.contact import BaseStress, Contact
 from memscal.model.arrays import FloatArray, array_record, floats
 from memscal.model.checks import (
@@ -142,7 +143,7 @@ class Restoration(Result, Checked):
     @property
     def force_uncertainty(self) -> float:
         """Standard uncertainty of :attr:`force`, in N."""
-        return float(np.linalg.norm(list(self.force_budget.values())))
+        return math.hypot(*self.force_budget.values())
 
     @property
     def force_budget(self) -> Mapping[str, float]:
@@ -150,7 +151,7 @@ class Restoration(Result, Checked):
         row = self._at_zero
         n = self.posterior.nodes
         return {
-            name: float(np.sqrt(max(float(row @ covariance[:n, :n] @ row), 0.0)))
+            name: math.sqrt(max(float(row @ covariance[:n, :n] @ row), 0.0))
             for name, covariance in self.posterior.covariances.items()
         }
 
@@ -172,7 +173,8 @@ class Restoration(Result, Checked):
     @property
     def baseline_uncertainty(self) -> float:
         """Standard uncertainty of :attr:`baseline`, in V."""
-        return float(np.sqrt(np.diag(self.posterior.covariance)[self.posterior.first_drift]))
+        i = self.posterior.first_drift
+        return math.sqrt(self.posterior.covariance[i, i])
 
     @property
     def resolved_wavenumber(self) -> float:
@@ -281,8 +283,7 @@ class Restoration(Result, Checked):
     @property
     def _at_zero(self) -> FloatArray:
         """Row that reads a transform at k = 0: by a parabola in k^2, as :class:`RadialSpectrum`."""
-        wavenumbers = self.posterior.wavenumbers
-        return wavenumbers.integrals(np.eye(wavenumbers.k.size))
+        return self.posterior.wavenumbers.integrals(np.eye(self.posterior.nodes))
 
     def _along_free(self, values: FloatArray) -> FloatArray:
         centre = np.zeros(2)
@@ -295,12 +296,11 @@ class Restoration(Result, Checked):
         reach = reach_of(self.points)
         if not np.all(radii <= reach):
             raise InputError(
-                f"A radius is {np.max(radii) * 1e3:.4g} mm.",
+                f"A radius is {radii.max() * 1e3:.4g} mm.",
                 why=f"The stress was restored out to {reach * 1e3:.4g} mm.",
                 cure="Give radii in metres, within 1.5 times the scan's width.",
             )
-        wavenumbers = self.posterior.wavenumbers
-        return wavenumbers.synthesise(np.eye(wavenumbers.k.size), radii)
+        return self.posterior.wavenumbers.synthesise(np.eye(self.posterior.nodes), radii)
 
 
 def _compared(restored: Restoration, stress: BaseStress) -> StressComparison:
@@ -346,7 +346,7 @@ def _direct(restored: Restoration, spectrum: FloatArray) -> tuple[float, int]:
     model = estimate.model
     # Repeats share the centre, which is zero across a line.
     geometry = model.geometry(restored.centre)
-    pressure = spectrum / film_transfer(scan.set_up.expected, model.reference.wavenumbers)
+    pressure = spectrum / posterior.film
     signal = model.signal(geometry, pressure)
     # One load cell errs alike under the rod, which changes A, and under the contact.
     by_load = (scan.load_uncertainty or 0.0) / scan.stated_load * signal[:, None]

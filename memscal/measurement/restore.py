@@ -107,7 +107,7 @@ def scan_at_load(scan: Scan, load: float) -> Scan:
     )
 
 
-def place_of(scan: Scan) -> str:
+def place_of(scan: Scan | MeasuredScan) -> str:
     """Name a scan's file, for messages."""
     return scan.source.file_name if scan.source else "The scan"
 
@@ -433,8 +433,9 @@ def restore(
     if isinstance(expected, str | PathLike):
         expected = read_reference(expected, accept_altered=accept_altered)
     require_measurement(measured, sensor)
-    sources = (sensor.source, measured.source, getattr(expected, "source", None))
-    overridden = accepted_alterations(*sources)
+    overridden = accepted_alterations(
+        sensor.source, measured.source, getattr(expected, "source", None)
+    )
     overridden += accept_mismatches(measured, sensor, override=override)
     restored = restore_known(measured, sensor, expected)
     return replace(restored, messages=(*override_messages(overridden), *restored.messages))
@@ -448,8 +449,8 @@ def restore_known(
 ) -> Restoration:
     """Restore a stress from a scan and an apparatus function that were checked to fit together."""
     # ``start``: the pressure of nearly the same voltages.
-    estimate, transfer = gaussian_pressure(scan, apparatus, start)
-    posterior = posterior_of(scan, apparatus, estimate, transfer)
+    estimate = gaussian_pressure(scan, apparatus, start)
+    posterior = posterior_of(scan, apparatus, estimate)
     nodes = posterior.nodes
     # From the axis to half the scan's width.
     r = np.linspace(0.0, reach_of(estimate.points) / 3, 161)
@@ -470,24 +471,20 @@ def restore_known(
 
 def gaussian_pressure(
     scan: Scan, apparatus: ApparatusFunction, start: ProfileEstimate | None = None
-) -> tuple[ProfileEstimate, FloatArray]:
-    """Return the best Gaussian pressure on the film, with departures, and A G's transform."""
+) -> ProfileEstimate:
+    """Return the best Gaussian pressure on the film, with departures."""
     points = measured_points(scan)
-    through, transfer = unit_force(scan, apparatus, points)
+    through = unit_force(scan, apparatus, points)
     with undetermined():
-        return estimate_profile(points, through, start=start), transfer
+        return estimate_profile(points, through, start=start)
 
 
-def unit_force(
-    scan: Scan, apparatus: ApparatusFunction, points: ScanPoints
-) -> tuple[RadialSpectrum, FloatArray]:
-    """Transform of a unit force's voltages, in V m^2 / N, and that of A G, in V/Pa."""
+def unit_force(scan: Scan, apparatus: ApparatusFunction, points: ScanPoints) -> RadialSpectrum:
+    """Transform of a unit force's voltages, in V m^2 / N."""
     # A film passes nothing of exp(-kh) beyond kh = 20: 2e-9 of the load.
     wavenumbers = Wavenumbers.covering(20.0 / scan.set_up.film.thickness, reach_of(points))
     transfer = apparatus.conversion_constant * sensor_changes(apparatus, wavenumbers.k)[0]
-    return RadialSpectrum(
-        wavenumbers, transfer * film_transfer(scan.set_up.expected, wavenumbers)
-    ), transfer
+    return RadialSpectrum(wavenumbers, transfer * film_transfer(scan.set_up.expected, wavenumbers))
 
 
 @contextmanager

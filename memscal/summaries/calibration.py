@@ -34,7 +34,6 @@ from memscal.summaries.declared import (
     Dataset,
     correlated_parameters,
     members,
-    parameter_frame,
     parameter_json,
     parameters_json,
     record_arrays,
@@ -221,8 +220,16 @@ def dataset(result: Calibrated) -> Dataset:
 
 
 def frame(result: Calibrated) -> DataFrame:
-    """Return a row for each parameter, with its standard uncertainty and unit."""
-    return parameter_frame(apparatus_of(result).parameters)
+    """Return a row for each parameter, with its standard uncertainty and SI unit."""
+    import pandas as pd
+
+    parameters = apparatus_of(result).parameters
+    columns = {
+        "value": parameters.values,
+        "standard_uncertainty": np.sqrt(np.diag(parameters.covariance)),
+        "unit": [parameter_quantity(parameters, name).si_unit for name in parameters.names],
+    }
+    return pd.DataFrame(columns, index=pd.Index(parameters.names, name="name"))
 
 
 def correlated(result: Calibrated) -> Values:

@@ -63,9 +63,10 @@ def mapping(comparison: FrictionComparison) -> Values:
         whole["macroscopic"] = None
         if comparison.macroscopic is not None:
             value, u = comparison.macroscopic
-            sliding = {"friction": value, "friction_uncertainty": u}
-            quantities = measured(records.FRICTION)
-            whole["macroscopic"] = members(quantities, None, **sliding)[records.FRICTION.name]
+            sliding = members(
+                measured(records.FRICTION), None, friction=value, friction_uncertainty=u
+            )
+            whole["macroscopic"] = sliding[records.FRICTION.name]
         whole["wrong_inputs"] = comparison.wrong_inputs
         whole["checks"] = checks_json(comparison.checks)
         whole["overridden"] = list(comparison.measured.overridden)
@@ -182,17 +183,19 @@ def _load(comparison: FrictionComparison, index: int) -> Values:
 
 def _by_loading(comparison: FrictionComparison, load: LoadComparison) -> Values:
     """Return what one load says of each coefficient, by one loading."""
-    profiles = []
-    for i, mu in enumerate(comparison.friction):
-        calculated = {
-            "friction": mu,
-            "sticking": bool(np.isinf(mu)),
-            "p_max": load.p_max[i],
-            "chi_square": load.chi_square[i],
-            "p_value": load.p_values[i],
-            "deviance": load.deviance[i],
-        }
-        profiles.append(members(records.CALCULATED, None, **calculated))
+    profiles = [
+        members(
+            records.CALCULATED,
+            None,
+            friction=mu,
+            sticking=bool(np.isinf(mu)),
+            p_max=load.p_max[i],
+            chi_square=load.chi_square[i],
+            p_value=load.p_values[i],
+            deviance=load.deviance[i],
+        )
+        for i, mu in enumerate(comparison.friction)
+    ]
     return {
         "effective_friction_coefficient": {
             "by_maximum": estimate_json(comparison, load.by_maximum),
@@ -351,8 +354,7 @@ def tables(comparison: FrictionComparison) -> list[Table]:
 
 def _maxima_table(comparison: FrictionComparison) -> Table:
     """Return measured and calculated maxima of each load."""
-    profiles = comparison.measured.profiles
-    sphere = profiles[0].scan.indenter
+    sphere = comparison.measured.scans[0].indenter
     title = (
         f"Measured stress S = U/A and frictionless p0, {sphere.shape} of radius "
         f"{sphere.radius / MM:.4g} mm (± standard uncertainty)"

@@ -1,5 +1,6 @@
 """Results by their declared quantities: JSON, cells of tables, datasets, and data frames."""
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -21,8 +22,7 @@ else:  # their libraries are imported when they are needed
 
 def total_of(budget: Mapping[str, float]) -> float:
     """Return the standard uncertainty of a budget; what correlations take away has a minus sign."""
-    variances = [np.copysign(u**2, u) for u in budget.values()]
-    return float(np.sqrt(max(sum(variances), 0.0)))
+    return math.sqrt(max(sum(u * abs(u) for u in budget.values()), 0.0))
 
 
 _UNCERTAINTY = "_uncertainty"
@@ -153,18 +153,6 @@ def record_arrays(
             attributes = {"units": quantity.si_unit, "long_name": quantity.words}
             variables[names.get(quantity.key, quantity.key)] = (axes, value, attributes)
     return variables
-
-
-def parameter_frame(parameters: ParameterSet) -> DataFrame:
-    """Return a row for each parameter, in its SI unit."""
-    import pandas as pd
-
-    columns = {
-        "value": parameters.values,
-        "standard_uncertainty": np.sqrt(np.diag(parameters.covariance)),
-        "unit": [parameter_quantity(parameters, name).si_unit for name in parameters.names],
-    }
-    return pd.DataFrame(columns, index=pd.Index(parameters.names, name="name"))
 
 
 def correlated_numbers(

@@ -31,7 +31,6 @@ _QUANTITIES = (
     Quantity("sigma_zz_calculated", "stress", "calculated normal stress", axes=("r",)),
 )
 _PROFILE = by_name(PROFILE.quantities)
-_FRICTIONLESS = "calculated without friction"
 _NUMBERS = ("force", "stress_on_axis", "centre", "centre_y", "baseline")
 
 
@@ -118,8 +117,9 @@ def tables(restored: Restoration) -> list[Table]:
 
 def _stress_table(restored: Restoration) -> Table:
     comparison = restored.comparison
-    strong = np.abs(restored.sigma_zz) > _TAIL * np.abs(restored.sigma_zz).max()
-    last = restored.r[np.flatnonzero(strong)[-1]]
+    size = abs(restored.sigma_zz)
+    strong = size > _TAIL * size.max()
+    last = restored.r[strong][-1]
     step = max(round(last / MM / (_SHOWN_RADII - 1) * 4) / 4, 0.05) * MM
     radii = np.arange(_SHOWN_RADII) * step
     radii = radii[radii <= restored.r[-1]]
@@ -140,7 +140,11 @@ def _stress_table(restored: Restoration) -> Table:
 def _origin(comparison: StressComparison) -> str:
     if isinstance(comparison.stress, Contact):
         friction = comparison.stress.friction
-        return f"calculated with friction {friction:.4g}" if friction else _FRICTIONLESS
+        return (
+            f"calculated with friction {friction:.4g}"
+            if friction
+            else "calculated without friction"
+        )
     source = comparison.stress.source
     return "expected stress" if source is None else f"expected stress ({source.file_name})"
 

@@ -1,5 +1,7 @@
 """Measured stress as tables, mapping and arrays, as ``memscal apply`` prints it."""
 
+from itertools import zip_longest
+
 import numpy as np
 
 from memscal.measurement.measure_stress import SHARED_SOURCES, pooled_force
@@ -130,12 +132,10 @@ def _common_table(stress: MeasuredStress) -> Table:
 def dataset(stress: MeasuredStress) -> declared.Dataset:
     """Return the points as (profile, point), NaN beyond the last of a profile, and its numbers."""
     profiles = stress.profiles
-    shape = (len(profiles), max(profile.r.size for profile in profiles))
     values: Values = {name: [getattr(p, name) for p in profiles] for name in _SCALARS}
     for name in _POINTS:
-        values[name] = np.full(shape, np.nan)
-        for row, profile in zip(values[name], profiles, strict=True):
-            row[: profile.r.size] = getattr(profile, name)
+        rows = [getattr(profile, name) for profile in profiles]
+        values[name] = np.transpose([*zip_longest(*rows, fillvalue=np.nan)])
     for i, name in enumerate(("centre", "centre_y")):
         values[name] = [p.centre[i] for p in profiles]
         values[f"{name}_uncertainty"] = [p.centre_uncertainty[i] for p in profiles]

@@ -20,14 +20,9 @@ _SUPERSCRIPTS = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
 
 
 # How a character is written where the terminal's encoding lacks it.
-_PLAIN = dict(zip("×²Δ₀µ–", "x2d0u-", strict=True)) | {
-    "±": "+/-",
-    "σ": "sigma",
-    "χ": "chi",
-    "ν": "nu",
-    "μ": "mu",
-    "…": "...",
-}
+_PLAIN = str.maketrans("×²Δ₀µ–", "x2d0u-") | str.maketrans(
+    {"±": "+/-", "σ": "sigma", "χ": "chi", "ν": "nu", "μ": "mu", "…": "..."}
+)
 
 
 def readable(text: str, stream: TextIO | None = None) -> str:
@@ -38,10 +33,9 @@ def readable(text: str, stream: TextIO | None = None) -> str:
         text.encode(encoding)
     except UnicodeEncodeError:
         # A terminal that shows ×10⁻⁷ as x10?? shows a wrong number.
-        power = re.compile("×10([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)")
-        text = power.sub(lambda match: "e" + match[1].translate(_SUPERSCRIPTS), text)
-        text = "".join(_PLAIN.get(c, c) for c in text)
-        text = text.encode(encoding, "replace").decode(encoding)
+        power = "×10([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)"
+        text = re.sub(power, lambda match: "e" + match[1].translate(_SUPERSCRIPTS), text)
+        text = text.translate(_PLAIN).encode(encoding, "replace").decode(encoding)
     return text
 
 

@@ -54,7 +54,7 @@ def test_shapes_of_one_width_have_one_mean_square_radius():
 def test_fits_and_likelihoods_of_shapes_are_those_of_least_squares(seed):
     scan = made.sphere_scan(made.pressed(), seed=seed)
     points = measured_points(scan)
-    start, _ = gaussian_pressure(scan, made.known_apparatus())
+    start = gaussian_pressure(scan, made.known_apparatus())
     reference = start.model.reference
     root = np.sqrt(start.weights)
     line = np.linspace(-1.0, 1.0, points.u.size)
@@ -93,7 +93,7 @@ def test_a_fit_that_does_not_settle_takes_the_gaussian(noise):
     contact = made.pressed(indenter=made.EXACT_ROD)
     for seed in range(8 if FULL else 4):
         scan = made.sphere_scan(contact, noise=noise, seed=seed)
-        start, _ = gaussian_pressure(scan, made.known_apparatus())
+        start = gaussian_pressure(scan, made.known_apparatus())
         root = np.sqrt(start.weights)
         for weighed in weighed_shapes(pressure_shapes(EXACT_FILM), start):
             fit = weighed.reduced.fit
