@@ -356,15 +356,16 @@ def array_messages(
         yield Message("not_counted", text, "warning")
     if places.size and not failing.get("crosstalk_identified"):
         values = fit.state.crosstalk[numbers >= 0]
+        mean = float(values.mean())
         # Alike for all pairs it is seen by its mean; of a single pair by the whole.
-        of_mean = np.linalg.norm(fit.posterior.root[places].mean(axis=0))
+        of_mean = float(np.linalg.norm(fit.posterior.root[places].mean(axis=0)))
         covariance = fit.widest.root[places] @ fit.widest.root[places].T
         square = float(values @ np.linalg.solve(covariance, values))
-        by_mean = 2 * ndtr(-abs(values.mean()) / of_mean)
+        by_mean = 2 * ndtr(-abs(mean) / of_mean)
         p_value = min(2 * min(chdtrc(places.size, square), by_mean), 1.0)
         yield Message(
             "crosstalk",
-            f"Crosstalk is {percent(values.mean())} on the mean (u {percent(of_mean)}); without "
+            f"Crosstalk is {percent(mean)} on the mean (u {percent(of_mean)}); without "
             f"any the probability of as much is p = {p_value:.2g}.",
         )
     stated = prepared.scans[0]
