@@ -89,6 +89,27 @@ _POSSIBLE: dict[str, Callable[[FloatArray], BoolArray]] = {
 }
 
 
+def _of_sensors(name: str, stated: ArrayLike, shape: tuple[int, ...]) -> NDArray[Any]:
+    """Prove what an array states of its sensors, each or all of them, and return it in full."""
+    with placed(f"{name} of the scan"):
+        values = frozen_array(stated)
+    possible = _POSSIBLE.get(name, np.isfinite)(values)
+    fewest = len(shape) if name == "layout" else 0
+    fits = values.ndim >= fewest and values.shape == shape[: values.ndim]
+    if not fits or not possible.all():
+        raise InputError(
+            f"{name} of the scan has shape {values.shape} and {possible.sum()} possible values, "
+            f"but it should be {shape}.",
+            why=f"There are {shape[0]} sensors. used is 0 or 1, an uncertainty finite and not "
+            "negative; an end of a range may be infinite, all else is finite.",
+            cure="Give such values of that shape, or leave it out.",
+        )
+    require_size(f"{name} of the scan", values[np.isfinite(values)], smallest=0.0)
+    # By its first axes, not by its last ones: one value for each sensor, or for all.
+    whole = np.broadcast_to(values.T, shape[::-1]).T
+    return whole > 0 if name == "used" else whole
+
+
 def require_rod_friction(friction: float | None) -> None:
     """Refuse a friction of the rod that no film of rubber is solved with."""
     if friction not in (None, 0.0, math.inf):
@@ -620,27 +641,8 @@ class Scan:
         shapes = {"u_zz_errors": u_zz.shape, **dict.fromkeys(OF_SENSORS, (number,))}
         shapes |= {"layout": (number, 2), "layout_uncertainty": (number, 2)}
         for name, shape in shapes.items():
-            own[name] = getattr(self, name)
-            if own[name] is None:
-                continue
-            with placed(f"{name} of the scan"):
-                values = frozen_array(own[name])
-            possible = _POSSIBLE.get(name, np.isfinite)(values)
-            fewest = len(shape) if name == "layout" else 0
-            fits = values.ndim >= fewest and values.shape == shape[: values.ndim]
-            if not fits or not possible.all():
-                raise InputError(
-                    f"{name} of the scan has shape {values.shape} and {possible.sum()} possible "
-                    f"values, but it should be {shape}.",
-                    why=f"There are {number} sensors. used is 0 or 1, an uncertainty finite and "
-                    "not negative; an end of a range may be infinite, all else is finite.",
-                    cure="Give such values of that shape, or leave it out.",
-                )
-            require_size(f"{name} of the scan", values[np.isfinite(values)], smallest=0.0)
-            # By its first axes, not by its last ones: one value for each sensor, or for all.
-            own[name] = np.broadcast_to(values.T, shape[::-1]).T
-            if name == "used":
-                own[name] = own[name] > 0
+            stated = getattr(self, name)
+            own[name] = None if stated is None else _of_sensors(name, stated, shape)
         low = own["reading_low"]
         high = own["reading_high"]
         if low is not None and high is not None and np.any(low >= high):

@@ -187,15 +187,7 @@ def calibrate_array(
             "range in their unit (reading_low, reading_high, --ceiling); scan past the sensors in "
             "steps of an eighth of the film's thickness.",
         )
-    prepared = prepare((opened.of_sensor(found.largest),), request)
-    first = prepared.scans[0]
-    if first.film is None or not isinstance(first.indenter, Rod):
-        raise InputError(
-            "The scan of the array has no film and rod, or a source is given in their place.",
-            why="What a contact makes at the base of the film is calculated from them.",
-            cure="State them (memscal import --thickness, --radius), and give no reference, or the "
-            "stress of a rod.",
-        )
+    prepared = _prepared(opened.of_sensor(found.largest), request)
     presses = _presses(opened, prepared, found)
     fit = fit_array(*_begun(opened, prepared, found, presses, crosstalk))
     own = kernel == "own" or (kernel == "auto" and opened.planar)
@@ -245,6 +237,20 @@ def _opened(scan: Scan | str | PathLike[str], *, accept_altered: bool) -> Scan:
             cure="Scan a raster, which finds both coordinates of each sensor.",
         )
     return opened
+
+
+def _prepared(scan: Scan, request: Request) -> Prepared:
+    """Prepare the scan of one sensor, which has the film and the rod of all."""
+    prepared = prepare((scan,), request)
+    first = prepared.scans[0]
+    if first.film is None or not isinstance(first.indenter, Rod):
+        raise InputError(
+            "The scan of the array has no film and rod, or a source is given in their place.",
+            why="What a contact makes at the base of the film is calculated from them.",
+            cure="State them (memscal import --thickness, --radius), and give no reference, or the "
+            "stress of a rod.",
+        )
+    return prepared
 
 
 def _presses(scan: Scan, prepared: Prepared, found: Sorted) -> Presses:

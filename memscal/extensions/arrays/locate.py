@@ -286,14 +286,7 @@ def locate(
     seeking = Seeking.on(array, indenter, shear)
     fields = seeking.fields
     readings = columns_of(array, u, "u")
-    zero, scatter = _zero(array, rest)
-    silent = array.used & np.isnan(zero) & np.isfinite(readings).any(axis=0)
-    if silent.any():
-        raise InputError(
-            f"rest holds no reading of {', '.join(np.array(array.sensors)[silent])}.",
-            why="Without its reading at rest none of a sensor's readings is that of a contact.",
-            cure="Give frames without contact in which it reads, or mark its readings as missing.",
-        )
+    zero, scatter = _zero(array, rest, readings)
     saturated = at_an_end(array, readings, tared=rest is None)
     values = np.where(saturated, np.nan, readings - zero)[:, fields.sensors]
     state = np.full((len(values), 5), np.nan)
@@ -364,8 +357,8 @@ def columns_of(array: ArrayData, readings: ArrayLike, name: str) -> FloatArray:
     return frames
 
 
-def _zero(array: ArrayData, rest: ArrayLike | None) -> ArrayPair:
-    """Return the readings without contact (n,), and the covariance of their error (n, n).
+def _zero(array: ArrayData, rest: ArrayLike | None, readings: FloatArray) -> ArrayPair:
+    """Return what readings are without contact (n,), and the covariance of their error (n, n).
 
     Of few frames that of the readings is known in few directions: the scan's, in size no smaller
     and that of the rest, counts as much as so many frames as there are sensors.
@@ -374,6 +367,13 @@ def _zero(array: ArrayData, rest: ArrayLike | None) -> ArrayPair:
         return np.zeros(len(array.noise)), np.zeros_like(array.noise)
     frames = np.ma.masked_invalid(columns_of(array, rest, "rest"))
     zero = frames.mean(axis=0)
+    silent = array.used & (frames.count(axis=0) == 0) & np.isfinite(readings).any(axis=0)
+    if silent.any():
+        raise InputError(
+            f"rest holds no reading of {', '.join(np.array(array.sensors)[silent])}.",
+            why="Without its reading at rest none of a sensor's readings is that of a contact.",
+            cure="Give frames without contact in which it reads, or mark its readings as missing.",
+        )
     away = (frames - zero).filled(0.0)
     used = array.used
     free = np.maximum(frames.count(axis=0), 1) - 1
