@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from memscal.apparatus import ApparatusFunction
+from memscal.axisymmetry.hankel import quotient
 from memscal.axisymmetry.kernels import unit_gaussian
 from memscal.calibration.film_inference import FilmLawComparison
 from memscal.calibration.messages import calibration_messages
@@ -155,8 +156,7 @@ def _radial(solution: Solution, deconvolution: Deconvolution, results: Results) 
     gaussian = unit_gaussian(g.r, solution.estimate.gaussian.sigma)
     errors = np.sqrt(np.diag(results.radial_covariance))
     scale = errors * results.parameters.uncertainty("conversion_constant")
-    with_a = results.with_constant
-    correlation = np.divide(with_a, scale, out=np.zeros_like(with_a), where=scale > 0)
+    correlation = quotient(results.with_constant, scale)
     return ApparatusRadial(g.r, g.radial, errors, gaussian, results.radial_covariance, correlation)
 
 

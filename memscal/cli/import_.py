@@ -353,7 +353,13 @@ def _set_up(options: Options) -> Options:
 
 def read_table(path: Path, options: Options) -> ImportedScan:
     """Read a scan with options that are prepared."""
-    from memscal.formats.tables.scan import ARRAYS, import_table, records_of
+    from memscal.formats.tables.scan import (
+        ARRAYS,
+        import_table,
+        records_of,
+        stated_in_words,
+        with_notes,
+    )
     from memscal.model.instrument import Dynamics, LoadCell, StressSensor
 
     if options["name_pattern"]:
@@ -368,4 +374,8 @@ def read_table(path: Path, options: Options) -> ImportedScan:
     stated["load_cell"] = LoadCell(**stated_options(load_cell, _CELL_NAMES))
     stated["x_error"] = options["position_error"]
     columns = stated_options(options, ("x", "u", *ARRAYS))
-    return with_laboratory(options["lab"], import_table(path, **columns, **records_of(stated)))
+    bare = import_table(path, **columns, **records_of(stated))
+    scan = with_laboratory(options["lab"], bare)
+    known = stated_in_words(bare)
+    added = [text for text in stated_in_words(scan) if text not in known]
+    return with_notes(scan, [f"With {options['lab'].name}: {text}" for text in added])

@@ -1,6 +1,5 @@
 """memscal-reference: a calculated stress profile at the base of the film, as HDF5, or by name."""
 
-import hashlib
 import os
 import re
 from io import BytesIO
@@ -18,7 +17,7 @@ from memscal.formats.hdf5.reader import SafeFile, open_hdf5
 from memscal.formats.hdf5.writer import REFERENCE_SCHEMA, Group, file_tree, write_tree
 from memscal.formats.units import to_si
 from memscal.model.arrays import require_positive
-from memscal.model.provenance import SourceFile
+from memscal.model.provenance import source_of
 from memscal.model.sizes import MOST_PIXELS, too_large
 from memscal.model.stress import IDEAL, IdealReference, StressField, StressProfile
 
@@ -143,7 +142,7 @@ def _read_pixels(path: FilePath, pixel_size: float | None) -> StressField:
             cure="Give one of numbers, in rows along y and columns along x.",
         )
     y, x = (pixel_size * np.arange(count) for count in values.shape)
-    source = SourceFile(name, hashlib.sha256(data).hexdigest())
+    source = source_of(name, data)
     with placed(name):
         return StressField(x=x, y=y, values=values, unit="1", notes=notes, source=source)
 

@@ -1,5 +1,6 @@
 """Provenance of data: files that were read, processing, time."""
 
+import hashlib
 import os
 from collections.abc import Mapping
 from dataclasses import field
@@ -32,6 +33,11 @@ class SourceFile:
     file_name: str
     sha256: str
     altered: str = ""
+
+
+def source_of(name: str, data: bytes) -> SourceFile:
+    """Return a file that was read by its base name and its bytes."""
+    return SourceFile(name, hashlib.sha256(data).hexdigest())
 
 
 def accepted_alterations(*sources: SourceFile | None) -> list[str]:

@@ -108,9 +108,13 @@ def test_a_sliding_scan_and_a_slow_sensor_are_stated_on_the_command_line(run, fo
     made += "--sliding-friction 0.3 --low-pass 5 --lab lab.toml --force"
     told = run(*made.split()).exits(0).out
     assert "Sensor: low-pass 5 Hz" in told
+    # Also of what the laboratory adds.
+    said = "With lab.toml: Sensor: low-pass 5 Hz (no uncertainty stated), resonance 90 Hz"
+    assert said in told
     scan = memscal.read_scan("slid.h5")
     assert (scan.motion, scan.speed, scan.x.max()) == ("sliding", 2e-3, 14e-3)
     assert scan.sliding_friction == 0.3
+    assert said in scan.notes
     assert scan.sensor.dynamics == memscal.Dynamics(low_pass=5.0, resonance=90.0, quality=8.0)
     shown = run("inspect", "slid.h5").exits(0).out
     for path in ("data/direction", "data/tangential_load", "indenter/speed", "dynamics/quality"):

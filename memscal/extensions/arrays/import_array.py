@@ -12,12 +12,12 @@ from memscal.errors import InputError
 from memscal.extensions.arrays.frames import without_options
 from memscal.formats.tables.columns import NamedColumns, Wanted
 from memscal.formats.tables.dialect import is_number
-from memscal.formats.tables.scan import ImportedScan
+from memscal.formats.tables.scan import ImportedScan, with_notes
 from memscal.formats.tables.sheets import open_table
 from memscal.formats.tables.stated import TableLayout
 from memscal.formats.units import to_si
 from memscal.model.arrays import Columns, FloatArray, Values
-from memscal.model.checks import at_ceiling_text, import_notes
+from memscal.model.checks import at_ceiling_text
 from memscal.model.scan import Scan
 
 #: Begins the names of the readings of each sensor, of which ``u_zz`` is the sum.
@@ -105,12 +105,10 @@ def array_scan(
     if scan.u_zz_errors is not None:  # of holds each sensor has its own
         stated["u_zz_errors"] = np.broadcast_to(own or [scan.u_zz_errors], u_zz.shape)
     array = replace(
-        scan,
+        with_notes(scan, notes),
         u_zz=u_zz,
         channels=channels,
         sensors=tuple(names),
-        messages=(*scan.messages, *import_notes(notes)),
-        notes="\n".join([scan.notes, *notes]),
         **stated,
     )
     most = int(np.nan_to_num(u_zz).argmax()) // scan.u_zz.size

@@ -5,7 +5,6 @@ memory, a copy without a name, and returns plain arrays, never pickles.
 """
 
 import contextlib
-import hashlib
 import io
 import json
 import os
@@ -29,7 +28,7 @@ from memscal.formats.units import from_si
 from memscal.model.arrays import Arrays, FloatArray, IndexArray, Values, array_record, floats
 from memscal.model.field_mesh import FieldMesh
 from memscal.model.notation import printable
-from memscal.model.provenance import SourceFile
+from memscal.model.provenance import SourceFile, source_of
 from memscal.version import __version__
 
 _WORKER = Path(__file__).with_name("worker.py")
@@ -240,7 +239,7 @@ def read_mesh(path: FilePath) -> Mesh:
     data = read_bytes(path)
     if not data:
         raise FormatError(f"{name} is empty.", cure="Save the mesh again.")
-    sources = [SourceFile(name, hashlib.sha256(data).hexdigest())]
+    sources = [source_of(name, data)]
     heavy: ByName = {}
     if kind == "xdmf":
         heavy, drawn = heavy_arrays(data, os.fspath(path))

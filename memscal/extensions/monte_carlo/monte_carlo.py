@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 from scipy.special import ndtr, ndtri
 
-from memscal.axisymmetry.hankel import RadialSpectrum
+from memscal.axisymmetry.hankel import RadialSpectrum, quotient
 from memscal.calibration.calibrate import Calibration, uncertainties
 from memscal.calibration.stages import Solution, solve
 from memscal.calibration.uncertainty import (
@@ -183,8 +183,7 @@ class DrawnScans:
         references = self.solution.estimate.model.references
         changes = []
         for true, nominal, own in zip(self._rods(scans), self._nominal, references, strict=True):
-            ratio = np.divide(own.values, nominal, out=np.zeros_like(nominal), where=nominal != 0)
-            changes.append(replace(own, values=(true - nominal) * ratio))
+            changes.append(replace(own, values=(true - nominal) * quotient(own.values, nominal)))
         return tuple(changes)
 
     def _results_of(self, solution: Solution) -> FloatArray:

@@ -267,7 +267,7 @@ def evaluate(plan: Plan, method: str | Method = "bayesian", seed: int = 0) -> De
     chosen = chosen_method(method, seed=seed)
     solution, results = expected_calibration(plan, chosen)
     deconvolution = solution.deconvolution
-    k, transfer = solution.fields.grid.axis_transfer(deconvolution.quotient.values)
+    k, transfer = solution.transfer
     return Design(
         plan=plan,
         method=chosen.name,
@@ -277,7 +277,7 @@ def evaluate(plan: Plan, method: str | Method = "bayesian", seed: int = 0) -> De
         g=deconvolution.g.radial,
         g_errors=np.sqrt(np.diag(results.radial_covariance)),
         k=k,
-        transfer=np.abs(transfer) / deconvolution.conversion_constant,
+        transfer=transfer,
         transfer_errors=results.transfer_errors,
         resolved_wavenumber=solution.band.resolved,
     )

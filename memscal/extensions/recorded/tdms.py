@@ -1,6 +1,5 @@
 """TDMS files of LabVIEW, through npTDMS, after a look at what they claim."""
 
-import hashlib
 import io
 import logging
 import struct
@@ -18,7 +17,7 @@ from memscal.formats.tables.dialect import cut_head
 from memscal.formats.tables.sheets import installed
 from memscal.formats.units import is_unit
 from memscal.model.arrays import Values
-from memscal.model.provenance import SourceFile
+from memscal.model.provenance import source_of
 from memscal.model.sizes import too_large
 
 _LEAD_IN = 28
@@ -62,7 +61,7 @@ def open_channels(path: FilePath, named: Values, **reading: Any) -> RecordedColu
         units.append("s")
         defaults = {"time": _TIME} if named["time"] is None else {}
     rows = len(signal) or max(map(len, channels.values()), default=0)
-    source = SourceFile(name, hashlib.sha256(data).hexdigest())
+    source = source_of(name, data)
     return RecordedColumns(source, arrays, units, rows, defaults, **reading)
 
 

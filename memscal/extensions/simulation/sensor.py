@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from memscal.axisymmetry.hankel import Wavenumbers
+from memscal.axisymmetry.hankel import Wavenumbers, quotient
 from memscal.axisymmetry.kernels import GaussianMixture, RadialKernel
 from memscal.errors import InputError
 from memscal.extensions.simulation.disturbances import Disturbances, Shear
@@ -70,9 +70,7 @@ class SimulatedSensor:
         seen = {"zz": blurred(self.kernel, 0)}
         if self.shear is not None:
             # Cosine of the angle from x to the indenter; 0 right on the sensor.
-            no_angle = np.zeros_like(offset + distance)
-            cosine = np.divide(offset, distance, out=no_angle, where=distance > 0)
-            seen["xz"] = blurred(self.shear[0], 1) * cosine
+            seen["xz"] = blurred(self.shear[0], 1) * quotient(offset, distance)
         return seen
 
 

@@ -4,7 +4,6 @@ HDF5 sees bytes in memory and never the disk; only known paths are opened, along
 every dataset is checked before it is read.
 """
 
-import hashlib
 import json
 import math
 from collections.abc import Callable, Iterable, Iterator
@@ -25,7 +24,7 @@ from memscal.formats.hdf5.writer import SCHEMA_ATTRIBUTE
 from memscal.formats.units import dimension_of, to_si
 from memscal.model.arrays import FloatArray, Values
 from memscal.model.notation import printable
-from memscal.model.provenance import SourceFile
+from memscal.model.provenance import SourceFile, source_of
 from memscal.model.quantities import DIMENSIONS
 from memscal.model.sizes import MOST_HDF5_BYTES
 
@@ -66,7 +65,7 @@ def open_hdf5(path: FilePath, *, accept_altered: bool = False) -> Iterator["Safe
             why="It does not begin with HDF5's signature.",
             cure="Convert a table with `memscal import`.",
         )
-    source = SourceFile(name, hashlib.sha256(data).hexdigest())
+    source = source_of(name, data)
     with damage_named(f"{name} cannot be opened as HDF5"):
         # The library's own copy of the bytes: no call of Python for each piece that it looks at.
         file = h5py.File(h5py.h5f.open_file_image(data))

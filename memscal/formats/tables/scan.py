@@ -238,6 +238,17 @@ def import_table(
     return scan
 
 
+def stated_in_words(scan: Scan) -> list[str]:
+    """Return what a scan states of its set-up, and of what else would be taken for granted."""
+    return [*_set_up_in_words(vars(scan)), *_granted_in_words(vars(scan))]
+
+
+def with_notes(scan: ImportedScan, texts: Sequence[str]) -> ImportedScan:
+    """Return a scan with further notes on how it was made."""
+    messages = (*scan.messages, *import_notes(texts))
+    return replace(scan, messages=messages, notes="\n".join([scan.notes, *texts]))
+
+
 def _require_sizes(scan: Scan) -> None:
     """Refuse lengths that no set-up has."""
     if scan.film is not None:

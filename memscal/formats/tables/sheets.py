@@ -26,7 +26,7 @@ from memscal.formats.tables.dialect import find_decimal
 from memscal.formats.tables.text_table import Sheet, TextTable
 from memscal.model.arrays import FloatArray, unmasked
 from memscal.model.notation import printable
-from memscal.model.provenance import SourceFile
+from memscal.model.provenance import SourceFile, source_of
 from memscal.model.sizes import MOST_FILE_BYTES, MOST_OTHER_TAGS, MOST_TAGS, too_large
 from memscal.progress import Task
 
@@ -264,7 +264,7 @@ def _parquet_table(name: str, data: bytes, **reading: Any) -> FrameTable:
     units = [
         ((head.metadata or {}).get(b"units") or b"").decode("utf-8", "replace") for head in heads
     ]
-    source = SourceFile(name, hashlib.sha256(data).hexdigest())
+    source = source_of(name, data)
 
     def column(index: int) -> Any:
         # Columns of one name are read together.
