@@ -23,8 +23,13 @@ Contacts: TypeAlias = Scan | MeasuredStress | FilePath | Sequence[Scan | Measure
 """Scans, or the stress that was measured of them; each itself or as the path of its file."""
 
 
-def given_scan(scan: Any, most: int | None = None, *, accept_altered: bool = False) -> Scan:
-    """Return a scan that is given itself or as a path, of a sensor or of an array."""
+def opened_scan(
+    scan: Any, most: int | None = None, *, accept_altered: bool = False, noise_record: Any = None
+) -> Scan:
+    """Return a single sensor's scan, given itself or as a path, with ``most`` points in a file.
+
+    Its noise is that of a noise record, given in one of these ways, or else its own.
+    """
     if isinstance(scan, str | PathLike):
         with open_hdf5(scan, accept_altered=accept_altered) as file:
             scan = scan_from(file, most)
@@ -33,17 +38,6 @@ def given_scan(scan: Any, most: int | None = None, *, accept_altered: bool = Fal
             f"{type(scan).__name__} is given where a Scan is needed.",
             cure="Give a scan, or the path of its file.",
         )
-    return scan
-
-
-def opened_scan(
-    scan: Any, most: int | None = None, *, accept_altered: bool = False, noise_record: Any = None
-) -> Scan:
-    """Return a single sensor's scan, given itself or as a path, with ``most`` points in a file.
-
-    Its noise is that of a noise record, given in one of these ways, or else its own.
-    """
-    scan = given_scan(scan, most, accept_altered=accept_altered)
     require_single(scan)
     if noise_record is not None:
         record = opened_scan(noise_record, accept_altered=accept_altered)

@@ -9,7 +9,7 @@ from typing import Any, TypeVar, dataclass_transform
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from memscal.errors import InputError, UnitWarning, placed
+from memscal.errors import InputError, UnitWarning
 
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.intp]
@@ -156,12 +156,14 @@ def slices(count: int, most: int) -> list[slice]:
     return [slice(start, min(start + most, count)) for start in range(0, count, most)]
 
 
-def frozen_array(values: ArrayLike, *, dtype: Any = np.float64) -> NDArray[Any]:
+def frozen_array(
+    values: ArrayLike, *, dtype: Any = np.float64, name: str = "The array"
+) -> NDArray[Any]:
     """Return a read-only copy, so that a frozen dataclass stays frozen; NaN where it is masked."""
     try:
         array = np.array(unmasked(values), dtype=dtype)
     except (TypeError, ValueError) as error:
-        raise InputError(f"An array of numbers is needed: {error}.") from error
+        raise InputError(f"{name} is no array of numbers: {error}.") from error
     array.setflags(write=False)
     return array
 
@@ -174,14 +176,12 @@ class FrozenArrays:
         for item in fields(self):
             value = getattr(self, item.name)
             if isinstance(value, np.ndarray | list):
-                with placed(item.name):
-                    object.__setattr__(self, item.name, frozen_array(value))
+                object.__setattr__(self, item.name, frozen_array(value, name=item.name))
 
 
 def finite_vector(name: str, values: ArrayLike) -> FloatArray:
     """Return a read-only 1-D copy; refuse another shape or a value that is not finite."""
-    with placed(name):
-        array = frozen_array(values)
+    array = frozen_array(values, name=name)
     if array.ndim != 1 or array.size == 0:
         raise InputError(f"{name} has shape {array.shape}, but a 1-D array with values is needed.")
     if not np.all(np.isfinite(array)):

@@ -12,7 +12,7 @@ from typing import Any, Literal, NamedTuple, TypedDict, Unpack
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from memscal.errors import InputError, placed
+from memscal.errors import InputError
 from memscal.extensions import hook
 from memscal.model.arrays import (
     BoolArray,
@@ -91,8 +91,7 @@ _POSSIBLE: dict[str, Callable[[FloatArray], BoolArray]] = {
 
 def _of_sensors(name: str, stated: ArrayLike, shape: tuple[int, ...]) -> NDArray[Any]:
     """Prove what an array states of its sensors, each or all of them, and return it in full."""
-    with placed(f"{name} of the scan"):
-        values = frozen_array(stated)
+    values = frozen_array(stated, name=f"{name} of the scan")
     possible = _POSSIBLE.get(name, np.isfinite)(values)
     fewest = len(shape) if name == "layout" else 0
     fits = values.ndim >= fewest and values.shape == shape[: values.ndim]
@@ -451,8 +450,8 @@ class Scan:
             self._freeze_array()
             return
         self._freeze_positions()
-        with placed("u_zz of the scan"):
-            object.__setattr__(self, "u_zz", frozen_array(self.u_zz))
+        u_zz = frozen_array(self.u_zz, name="u_zz of the scan")
+        object.__setattr__(self, "u_zz", u_zz)
         self._check_signal_shape()
         self._freeze_readings()
         self._check_values()
@@ -619,8 +618,7 @@ class Scan:
         """Freeze what an array states of its sensors, and prove the scan of each by itself."""
         names = tuple(map(str, self.sensors))
         number = len(names)
-        with placed("u_zz of the scan"):
-            u_zz = frozen_array(self.u_zz)
+        u_zz = frozen_array(self.u_zz, name="u_zz of the scan")
         if len({*names, ""}) <= number or u_zz.shape[:1] != (number,) or self.channels:
             raise InputError(
                 f"The scan names these sensors: {', '.join(names) or 'none'}; u_zz has shape "

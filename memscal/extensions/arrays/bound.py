@@ -42,7 +42,7 @@ def predict(
 
 def states(places: ArrayLike, force: ArrayLike, shear: ArrayLike) -> FloatArray:
     """Return contacts as rows of x, y, force, and shear over force along x and y, (m, 5)."""
-    at = np.atleast_2d(frozen_array(places))
+    at = np.atleast_2d(frozen_array(places, name="The array of places"))
     if at.ndim != 2 or at.shape[1] != 2:
         raise InputError(
             f"The places have shape {np.shape(places)}, but x and y of each are needed, (m, 2).",

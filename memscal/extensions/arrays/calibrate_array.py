@@ -35,7 +35,7 @@ from memscal.extensions.arrays.presses import (
     sorted_readings,
 )
 from memscal.extensions.arrays.sensor_array import SensorArray
-from memscal.formats.opened import given_scan
+from memscal.formats.scan import read_scan
 from memscal.model.arrays import (
     Arrays,
     BoolArray,
@@ -216,10 +216,13 @@ def calibrate_array(
 
 def _opened(scan: Scan | str | PathLike[str], *, accept_altered: bool) -> Scan:
     """Return the scan of an array, given itself or as a path; refuse that of a single sensor."""
-    opened = given_scan(scan, accept_altered=accept_altered)
-    if not opened.sensors:
+    if isinstance(scan, str | PathLike):
+        opened = read_scan(scan, accept_altered=accept_altered)
+    else:
+        opened = scan
+    if not getattr(opened, "sensors", ()):
         raise InputError(
-            "The scan is that of a single sensor, not of an array.",
+            f"The scan, {opened!r}, is that of a single sensor or of none, not of an array.",
             why="An array names its sensors (Scan(sensors=...), memscal import --u 'u_*').",
             cure="Calibrate it with memscal.calibrate.",
         )

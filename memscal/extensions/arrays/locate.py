@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import chdtrc
 
-from memscal.errors import InputError, placed
+from memscal.errors import InputError
 from memscal.extensions.arrays.array_data import ArrayData
 from memscal.extensions.arrays.contacts import Contacts
 from memscal.extensions.arrays.measured_fields import MeasuredFields
@@ -343,8 +343,7 @@ def locate(
 
 def columns_of(array: ArrayData, readings: ArrayLike, name: str) -> FloatArray:
     """Return readings as frames; refuse another number of columns than that of the sensors."""
-    with placed(f"The array {name}"):
-        frames = np.atleast_2d(frozen_array(readings))
+    frames = np.atleast_2d(frozen_array(readings, name=name))
     require_size(name, frames, smallest=0.0)
     count = len(array.sensors)
     if frames.ndim != 2 or frames.shape[1] != count:
