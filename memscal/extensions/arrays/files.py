@@ -40,6 +40,9 @@ RECORDS = {name: _declared(**table) for name, table in _TABLES.items()}
 LAYOUT = {f"/entry/{name}": of for name, of in RECORDS.items()}
 """The same by their paths, for ``memscal check`` and ``memscal inspect``."""
 
+#: The transform of G is 1 at zero within this, at the smallest wavenumber.
+_UNIT = 0.1
+
 _PARTS = ("of_ln_a", "of_x", "of_y", "of_c", "of_mode")
 
 
@@ -145,13 +148,16 @@ def _faults(data: ArrayData) -> Iterator[str]:
         yield "sensors are at one place"
     kernel = np.fmax.reduce(data.kernels)
     reference = 0.0 * kernel if data.reference is None else data.reference
-    if not np.isfinite(np.vstack([data.k, kernel, data.modes.changes, reference])).all():
-        yield "kernels are not finite"
+    numbers = np.vstack([data.k, kernel, data.modes.changes, reference])
+    if not np.isfinite(numbers).all() or not np.isfinite(data.columns).all():
+        yield "kernels or roots are not finite"
     if np.any(np.diff(data.k) <= 0) or not np.all(abs(data.modes.owner + 0.5) < used.size):
         yield "wavenumbers do not increase, or a mode has no sensor"
     a = data.conversion_constants[used]
     if data.kernel != "measured" and not np.all((a > 0) & np.isfinite(a)):
         yield "conversion constants are not finite and above zero"
+    if data.kernel != "measured" and abs(kernel[0] - 1) > _UNIT:
+        yield "G does not integrate to 1"
     crosstalk = data.crosstalk[np.ix_(used, used)]
     if not np.isfinite(crosstalk).all() or np.any(np.diag(crosstalk) != 1):
         yield "crosstalk is not finite, or not 1 of a sensor with itself"

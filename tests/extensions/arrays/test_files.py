@@ -88,11 +88,13 @@ def test_a_changed_file_is_refused_or_accepted_on_record(tmp_path):
 @pytest.mark.parametrize(
     ("path", "value", "words"),
     [
-        ("kernel/k", np.nan, "kernels are not finite"),
+        ("kernel/k", np.nan, "kernels or roots are not finite"),
         ("kernel/k", 1e9, "do not increase"),
-        ("kernel/transfer", np.nan, "kernels are not finite"),
-        ("kernel/changes", np.nan, "kernels are not finite"),
-        ("kernel/reference", np.nan, "kernels are not finite"),
+        ("kernel/transfer", np.nan, "kernels or roots are not finite"),
+        ("kernel/transfer", 0.0, "G does not integrate to 1"),
+        ("roots/of_ln_a", np.nan, "kernels or roots are not finite"),
+        ("kernel/changes", np.nan, "kernels or roots are not finite"),
+        ("kernel/reference", np.nan, "kernels or roots are not finite"),
         ("kernel/owner", 9, "a mode has no sensor"),
         ("sensors/centre_x", np.nan, "centres are not known"),
         ("sensors/line_y", np.nan, "centres are not known"),
