@@ -81,7 +81,7 @@ def certificate_pdf(page: Page, xml: bytes) -> bytes:
         items = [_plain(name, item) for name, item in part.items]
         parts.append({"heading": part.heading, "items": items})
     contents = {"texts": page.texts, "boxes": page.boxes, "parts": parts}
-    return typst.compile(
+    made: bytes = typst.compile(
         _TYPST,
         format="pdf",
         pdf_standards=["a-3a", "ua-1"],
@@ -90,6 +90,7 @@ def certificate_pdf(page: Page, xml: bytes) -> bytes:
         ignore_system_fonts=True,
         timestamp=int(datetime.fromisoformat(timestamp()).timestamp()),
     )
+    return made
 
 
 def _plain(name: str, item: Item) -> Values:
