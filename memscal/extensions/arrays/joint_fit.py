@@ -141,8 +141,7 @@ def noise_of(model: JointModel, state: ArrayState) -> Noise:
     smallest = (_ROUNDING * np.ptp(presses.u, axis=1)) ** 2
     # Presses whose stated errors are small to a sensor, as it is far from them, tell its noise.
     kept = np.ma.masked_array(residual**2, ~presses.keep)
-    # Masked arrays of numpy have no types.
-    typical: Any = np.ma.median(kept, axis=1)  # type: ignore[no-untyped-call]
+    typical: Any = np.ma.median(kept, axis=1)  # type: ignore[no-untyped-call] # np.ma has no types
     level = typical.filled(0.0) + np.maximum(smallest, TINY)
     weight = presses.keep / (level[:, None] + np.sum(errors**2, axis=0))
     weighed = weight * np.concatenate([residual[None], errors])

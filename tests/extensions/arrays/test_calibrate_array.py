@@ -262,6 +262,28 @@ def refused_scans():
     yield "beside", replace(scan, line_offset=0.5e-3), {}, InputError, "0.5 mm beside"
     yield "dynamics", replace(scan, sensor=slow), {}, InputError, "stress_sensor/dynamics"
     yield "silent", replace(scan, u_zz=0 * scan.u_zz), {}, FitError, "3 sensors"
+    yield "falling", replace(scan, u_zz=-scan.u_zz), {}, FitError, "change their sign"
+    yield "source", scan, {"reference": "point"}, InputError, "a source is given in their place"
+    yield "none", None, {}, InputError, "None, is that of a single sensor or of none"
+
+
+@pytest.mark.parametrize(
+    ("stated", "words"),
+    [
+        ({"layout_uncertainty": -1e-5}, "layout_uncertainty .* 0 possible values"),
+        ({"layout_uncertainty": np.inf}, "layout_uncertainty .* 0 possible values"),
+        ({"used": [2, -3, 1]}, "used .* 1 possible values"),
+        ({"board": [0, np.nan, 1]}, "board .* 2 possible values"),
+        ({"board": ["A", "B", "C"]}, "board of the scan is no array of numbers"),
+        ({"layout": np.full((3, 2), 1e300)}, "layout of the scan is 1e.300"),
+        ({"reading_low": 1.0, "reading_high": -1.0}, "reading_low .* is not below"),
+        ({"motion": "rest"}, "record at rest is of 3 sensors"),
+    ],
+)
+def test_what_no_sensors_have_is_no_scan_of_an_array(stated, words):
+    readings = np.ones((3, 5)) * np.arange(5)
+    with pytest.raises(InputError, match=words):
+        memscal.Scan(sensors=("A", "B", "C"), x=np.arange(5.0) * 1e-3, u_zz=readings, **stated)
 
 
 @pytest.mark.parametrize(

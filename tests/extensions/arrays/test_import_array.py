@@ -35,6 +35,9 @@ def test_columns_become_sensors_in_their_order_with_their_places(run):
     np.testing.assert_allclose(scan.layout, [[-4e-3, 0], [4e-3, 0], [0, 5e-4]])
     np.testing.assert_allclose(scan.layout_uncertainty, [[2e-5, 2e-6], [3e-5, 3e-6], [1e-5, 1e-6]])
     np.testing.assert_allclose(scan.reading_high, 2.5e-3)
+    assert "2 readings at the ceiling are left out" in scan.notes
+    assert "Read from layout.csv (SHA-256 " in scan.notes
+    run(*words.replace("2.5", "0.001").replace("scan", "all").split()).exits(3, "All 6 readings")
     words = "import row.csv -o two.h5 --x x --u u_C --u u_A --u-sign -1"
     run(*words.split()).exits(0)
     two = read_scan("two.h5")
@@ -50,6 +53,8 @@ def test_columns_become_sensors_in_their_order_with_their_places(run):
         (["u_A", "v*"], LAYOUT, "'v.*'"),
         ("u_*", LAYOUT.replace("u_B,", "u_A,"), "3 rows for 3 sensors, .* exactly once: u_A, u_B"),
         ("u_*", LAYOUT.replace("u_B,", "u_D,"), "none of u_a, u_c, u_b, in line 2 .'u_D'"),
+        ("u_*", LAYOUT.replace("u_A,", "0,"), "exactly once: u_A"),
+        ("u_*", LAYOUT.replace("x [mm]", "x"), "no unit .*\n.*one head .sensor, 'x"),
         ("u_*", LAYOUT.replace("-4,", ","), "column .x. is empty in line 3"),
         ("u_A", LAYOUT, "names these sensors: none; .*\n.*single sensor has no layout"),
     ],

@@ -390,7 +390,7 @@ def files(tmp_path):
     with (tmp_path / "frames.csv").open("w") as file:
         names = [*reversed(ROW.sensors)]
         file.write("frame," + ",".join(f"{name} [mV]" for name in names) + "\n")
-        for number, row in zip((7, 9), u, strict=True):
+        for number, row in zip((20261128000001, 20261128000002), u, strict=True):
             file.write(f"{number}," + ",".join(map(str, row[::-1])) + "\n")
         file.write("11" + "," * len(names) + "\n")
     return tmp_path
@@ -414,12 +414,14 @@ def test_the_command_writes_the_table_of_contacts(files, run):
         "force_errors [N]",
         "flags",
     ]
-    assert [row["frame"] for row in rows] == ["7", "9", "11"]
+    assert [row["frame"] for row in rows] == ["20261128000001", "20261128000002", "11"]
     assert float(rows[0]["x [mm]"]) == pytest.approx(0.5, abs=0.01)
     assert float(rows[1]["force [N]"]) == pytest.approx(1.0, abs=0.01)
     assert rows[0]["y_errors [mm]"] == ""
     assert (rows[2]["x [mm]"], rows[2]["flags"]) == ("", "no reading")
     assert run(*arguments).code == 4
+    run(*arguments[:4], files / "c.xlsx").exits(2, "does not end in .csv")
+    run(*arguments[:3], "--indenter", "rod").exits(2, "'rod' is not point, rod:MM")
 
 
 @pytest.mark.parametrize("delimiter", [",", "\t"])

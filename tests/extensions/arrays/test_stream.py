@@ -199,6 +199,10 @@ def test_two_contacts_and_one_outside_are_flagged(seed):
         (lambda: ARRAY.stream(RATE).restore(WIDER.stream(RATE).state()), "not of a stream"),
         (lambda: ARRAY.stream(RATE).restore(None), "state is not of a stream"),
         (
+            lambda: ARRAY.stream(RATE).restore(ARRAY.stream(RATE).state() | {"frames": np.nan}),
+            "state is not of a stream",
+        ),
+        (
             lambda: ARRAY.stream(RATE, limit=(0, 1)).restore(ARRAY.stream(RATE).state()),
             "state is not of a stream",
         ),
