@@ -73,13 +73,19 @@ def test_the_map_of_the_bound_shows_the_sensors(array):
     np.testing.assert_allclose(1e-3 * drawn, PLACES, atol=1.5 * STEP)
 
 
-def test_the_maps_are_smoother_than_the_readings(array):
-    readings = array.readings
-    true = fields(np.stack([readings.x, readings.y], axis=1)).T
-    smoothed = np.sqrt(np.mean((readings.predicted - true) ** 2))
-    assert smoothed < 0.8 * np.sqrt(np.mean((readings.u - true) ** 2))
+def test_the_maps_are_smoother_than_the_readings(rng):
+    """By one raster the share of the scatter that is left is known to 0.03 only."""
+    squares = []
+    for _ in range(8):
+        array = memscal.calibrate_array(raster(rng), kernel="measured").array
+        readings = array.readings
+        true = fields(np.stack([readings.x, readings.y], axis=1)).T
+        errors = [readings.predicted - true, readings.u - true]
+        squares.append([*np.mean(np.square(errors), axis=(1, 2)), np.mean(array.root[:5]) ** 2])
+    smoothed, read, stated = np.sqrt(np.mean(squares, axis=0))
+    assert smoothed < 0.8 * read
     # What is stated of the maps is their error.
-    assert smoothed == pytest.approx(np.mean(array.root[:5]), rel=0.5)
+    assert smoothed == pytest.approx(stated, rel=0.5)
 
 
 def test_such_an_array_is_kept_in_a_file_and_drawn(array, tmp_path):
