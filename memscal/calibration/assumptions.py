@@ -101,7 +101,8 @@ def less_mean_offset(solution: Solution) -> Solution:
 
 
 def _again(solution: Solution, scans: Sequence[Scan]) -> Solution:
-    solved = solve(scans, solution.stresses, solution.method, owners=solution.owners)
+    per = solution.estimate.points.reading.per
+    solved = solve(scans, solution.stresses, solution.method, owners=solution.owners, per=per)
     return replace(solved, apart=solution.apart)
 
 

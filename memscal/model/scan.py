@@ -12,7 +12,7 @@ from typing import Any, Literal, NamedTuple, TypedDict, Unpack
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from memscal.errors import InputError
+from memscal.errors import InputError, counted, require_names
 from memscal.extensions import hook
 from memscal.model.arrays import (
     BoolArray,
@@ -127,7 +127,7 @@ def require_single(scan: Scan) -> None:
             f"{len(scan.sensors)} sensors.",
             why="What a sensor reads of its neighbours changes its A: it is no single sensor.",
             cure="Calibrate the array (memscal calibrate, memscal.calibrate_array), and locate "
-            "contacts (memscal locate). The scan of one sensor by itself is scan.of_sensor(i).",
+            "contacts (memscal locate). The scan of one sensor by itself is scan.of_sensor(name).",
         )
 
 
@@ -539,13 +539,18 @@ class Scan:
         """Shape of the readings of one sensor."""
         return self.u_zz.shape[bool(self.sensors) :]
 
-    def of_sensor(self, i: int) -> Scan:
-        """Return the scan of one sensor of an array, counted from 0, by itself."""
+    def of_sensor(self, sensor: str | int) -> Scan:
+        """Return the scan of one sensor of an array by itself, by its name or number (from 0)."""
+        if isinstance(sensor, str):
+            require_names("There is no sensor", [sensor], self.sensors)
+            i = self.sensors.index(sensor)
+        else:
+            i = sensor
         own: Values = dict.fromkeys(OF_SENSORS)
         if self.u_zz_errors is not None:
             own["u_zz_errors"] = self.u_zz_errors[i]
-        sensor = replace(self.sensor, name=self.sensors[i])
-        return replace(self, u_zz=self.u_zz[i], sensors=(), sensor=sensor, **own)
+        described = replace(self.sensor, name=self.sensors[i])
+        return replace(self, u_zz=self.u_zz[i], sensors=(), sensor=described, **own)
 
     @property
     def kind(self) -> str:
@@ -619,16 +624,26 @@ class Scan:
         names = tuple(map(str, self.sensors))
         number = len(names)
         u_zz = frozen_array(self.u_zz, name="u_zz of the scan")
-        if len({*names, ""}) <= number or u_zz.shape[:1] != (number,) or self.channels:
-            raise InputError(
-                f"The scan names these sensors: {', '.join(names) or 'none'}; u_zz has shape "
-                f"{u_zz.shape}, and further channels are: {', '.join(self.channels) or 'none'}.",
-                why="The first axis of the readings of an array is the sensor. A single sensor has "
-                "no layout, board or range.",
-                cure="Give a list of names, one for each sensor (--u of each), all different and "
-                "none empty, and further channels as sensors of their own; or leave layout "
-                "(--layout), board and range out.",
-            )
+        told = all(name.isprintable() for name in names) and len({*names, ""}) > number
+        further = ", ".join(self.channels)
+        faults = [
+            (not names, "states layout, board or range, but names no sensors", "Leave them out"),
+            (not told, f"names its sensors {', '.join(map(repr, names))}", "Change these names"),
+            (
+                u_zz.shape[:1] != (number,),
+                f"names {counted(number, 'sensors')}, and u_zz has shape {u_zz.shape}",
+                "Give as many",
+            ),
+            (bool(further), f"has further channels, {further}", "Name them as sensors"),
+        ]
+        for wrong, problem, cure in faults:
+            if wrong:
+                raise InputError(
+                    f"The scan {problem}.",
+                    why="Each sensor of an array has a name in one line, unlike all others, and "
+                    "readings along the first axis of u_zz.",
+                    cure=f"{cure}, or name each sensor (sensors, --u of each).",
+                )
         if self.motion == "rest":
             raise InputError(
                 f"The record at rest is of {number} sensors.",
@@ -650,7 +665,7 @@ class Scan:
                 cure="Give the lower end of the range of each sensor, and the upper one.",
             )
         vars(self).update(own)
-        first, *_ = [self.of_sensor(i) for i in range(number)]
+        first, *_ = map(self.of_sensor, range(number))
         vars(self).update(vars(first) | own)
 
     def _freeze_positions(self) -> None:

@@ -24,7 +24,8 @@ def test_the_scan_of_an_array_comes_back_and_holds_that_of_each_sensor(kind):
     assert_same(found, scan, but=("source",))
     one = make_scan(kind)
     assert (found.kind, found.planar, found.shape) == (one.kind, one.planar, one.u_zz.shape)
-    third = found.of_sensor(2)
+    third = found.of_sensor("µ 2")
+    assert_same(third, found.of_sensor(2))
     assert (third.sensor.name, third.sensors) == ("µ 2", ())
     np.testing.assert_allclose(third.u_zz, 3 * one.u_zz)
     np.testing.assert_array_equal(third.normal_load, one.normal_load)
@@ -38,17 +39,25 @@ def test_the_scan_of_an_array_comes_back_and_holds_that_of_each_sensor(kind):
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"sensors": ("a", "b", "a")}, "all different"),
-        ({"sensors": ("a", "b")}, r"u_zz has shape \(3, 33\)"),
+        ({"sensors": ("a", "b", "a")}, "names its sensors 'a', 'b', 'a'"),
+        ({"sensors": ("a", "", "c")}, "names its sensors 'a', ''"),
+        ({"sensors": ("a", "b\nc", "d")}, r"'b\\nc'(.|\n)*in one line"),
+        ({"sensors": ("a", "b")}, r"names 2 sensors, and u_zz has shape \(3, 33\)"),
+        ({"sensors": ()}, "layout, board or range, but names no sensors"),
         ({"normal_load": np.ones((3, 33))}, r"normal_load has shape \(3, 33\)"),
         ({"layout": [0, 1, 2]}, r"layout of the scan has shape \(3,\).*\(3, 2\)"),
         ({"layout": [[0, 0], [1, np.nan], [2, 0]]}, "finite"),
-        ({"channels": {"u_xz": np.ones((3, 33))}}, "further channels are: u_xz"),
+        ({"channels": {"u_xz": np.ones((3, 33))}}, "further channels, u_xz"),
     ],
 )
 def test_what_is_no_array_is_refused(changes, words):
     with pytest.raises(InputError, match=words):
         make_array_scan(**changes)
+
+
+def test_a_sensor_that_an_array_has_not_is_refused():
+    with pytest.raises(InputError, match="no sensor T9. *\n.*Choose from"):
+        make_array_scan().of_sensor("T9")
 
 
 def renamed(names):
@@ -58,7 +67,7 @@ def renamed(names):
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        (renamed('["T00", "T01"]'), r"sensors: T00, T01; u_zz has shape \(3, 33\)"),
+        (renamed('["T00", "T01"]'), r"names 2 sensors, and u_zz has shape \(3, 33\)"),
         (lambda data: data.pop("sensor_names"), r"sensor as axis 0(.|\n)*sensor_names"),
         (lambda data: data.pop("layout_y"), "finite"),
         (lambda data: data.attrs.update(axes=["x", "sensor"]), "x as axis 0, sensor as axis 1"),

@@ -56,7 +56,7 @@ def test_columns_become_sensors_in_their_order_with_their_places(run):
         ("u_*", LAYOUT.replace("u_A,", "0,"), "exactly once: u_A"),
         ("u_*", LAYOUT.replace("x [mm]", "x"), "no unit .*\n.*one head .sensor, 'x"),
         ("u_*", LAYOUT.replace("-4,", ","), "column .x. is empty in line 3"),
-        ("u_A", LAYOUT, "names these sensors: none; .*\n.*single sensor has no layout"),
+        ("u_A", LAYOUT, "scan states layout, board or range, but names no sensors"),
     ],
 )
 def test_what_is_no_array_or_not_its_layout_is_refused(u, layout, words):
