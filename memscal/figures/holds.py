@@ -17,7 +17,9 @@ def holds_figure(holds: Holds) -> Figure:
     """Draw position, load and reading over the lines of the file, and readings over position."""
     mean = holds.mean
     reading = holds.reading
-    reading_label = f"reading ({reading.unit})"
+    # Of an array the holds are those of the sum, and each sensor has a mean of its own.
+    summed = "sum of all readings" if any(" of " in name for name in mean) else "reading"
+    reading_label = f"{summed} ({reading.unit})"
     names = {
         "x": ("x (mm)", MM),
         "y": ("y (mm)", MM),

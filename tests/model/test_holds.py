@@ -139,3 +139,13 @@ def test_a_plateau_at_a_lesser_depth_is_no_baseline():
     holds = found(columns, columns["depth"], baseline=True)
     truth = 15e-3 * np.exp(-((holds.mean["x"] / 1.5e-3) ** 2) / 2)
     np.testing.assert_allclose(holds.mean["u_zz"], truth, atol=1e-5)
+
+
+def test_the_figure_says_that_the_readings_of_an_array_are_added_up():
+    columns = log(1)
+    labels = {}
+    for further in ({}, {"u_zz of A": columns["u_zz"]}):
+        figure = found(columns | further).plot()
+        labels[len(further)] = {axes.get_ylabel() for axes in figure.axes}
+    assert "reading (mV)" in labels[0]
+    assert "sum of all readings (mV)" in labels[1]
