@@ -33,8 +33,8 @@ def holds_figure(holds: Holds) -> Figure:
     with panels_of(1.6 * (len(shown) + 1.4), len(shown) + 1) as (figure, panels):
         for axes, name in zip(panels, shown, strict=False):
             label, scale = names[name]
-            log = holds.log[name] / scale
-            axes.plot(holds.line[::every], log[::every], color="0.6", lw=0.7)
+            log = holds.log[name][::every] / scale
+            axes.plot(holds.line[::every], log, color="0.6", lw=0.7)
             axes.hlines(mean[name] / scale, first, last, color=GAUSSIAN, lw=2.5, zorder=3)
             axes.set_ylabel(label)
             axes.sharex(panels[0])

@@ -12,7 +12,7 @@ from typing import Any, Literal, NamedTuple, TypedDict, Unpack
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from memscal.errors import InputError, counted, require_names
+from memscal.errors import InputError, require_names
 from memscal.extensions import hook
 from memscal.model.arrays import (
     BoolArray,
@@ -541,11 +541,10 @@ class Scan:
 
     def of_sensor(self, sensor: str | int) -> Scan:
         """Return the scan of one sensor of an array by itself, by its name or number (from 0)."""
-        if isinstance(sensor, str):
-            require_names("There is no sensor", [sensor], self.sensors)
-            i = self.sensors.index(sensor)
-        else:
-            i = sensor
+        i = sensor
+        if isinstance(i, str):
+            require_names("There is no sensor", [i], self.sensors)
+            i = self.sensors.index(i)
         own: Values = dict.fromkeys(OF_SENSORS)
         if self.u_zz_errors is not None:
             own["u_zz_errors"] = self.u_zz_errors[i]
@@ -625,24 +624,21 @@ class Scan:
         number = len(names)
         u_zz = frozen_array(self.u_zz, name="u_zz of the scan")
         told = all(name.isprintable() for name in names) and len({*names, ""}) > number
-        further = ", ".join(self.channels)
-        faults = [
-            (not names, "states layout, board or range, but names no sensors", "Leave them out"),
-            (not told, f"names its sensors {', '.join(map(repr, names))}", "Change these names"),
-            (
-                u_zz.shape[:1] != (number,),
-                f"names {counted(number, 'sensors')}, and u_zz has shape {u_zz.shape}",
-                "Give as many",
-            ),
-            (bool(further), f"has further channels, {further}", "Name them as sensors"),
-        ]
-        for wrong, problem, cure in faults:
+        faults = {
+            "states layout, board or range, but names no sensors": not names,
+            f"names its sensors {', '.join(map(repr, names))}": not told,
+            f"names {number} sensors, and u_zz has shape {u_zz.shape}": u_zz.shape[:1] != (number,),
+            f"has further channels, {', '.join(self.channels)}": bool(self.channels),
+        }
+        for problem, wrong in faults.items():
             if wrong:
                 raise InputError(
                     f"The scan {problem}.",
-                    why="Each sensor of an array has a name in one line, unlike all others, and "
-                    "readings along the first axis of u_zz.",
-                    cure=f"{cure}, or name each sensor (sensors, --u of each).",
+                    why="Each sensor of an array has readings along the first axis of u_zz, and a "
+                    "name in one line, unlike all others.",
+                    cure="Name each sensor (sensors, --u of each), none twice, and further "
+                    "channels as sensors of their own; of one sensor leave layout (--layout), "
+                    "board and range out.",
                 )
         if self.motion == "rest":
             raise InputError(

@@ -243,3 +243,11 @@ def test_points_on_two_lines_are_two_lines():
     apart = memscal.calibrate(lines).apparatus
     # One reading where they cross is of the first line.
     assert points.conversion_constant == pytest.approx(apart.conversion_constant, rel=2e-3)
+
+
+def test_what_is_solved_again_without_the_mean_offset_keeps_the_unit_of_its_reference():
+    scan = replace(memscal.simulate(seed=1), line_offset_uncertainty=0.2e-3)
+    disc = memscal.IdealReference("disc", 0.25e-3)
+    calibration = memscal.calibrate(scan, reference=disc, other=False)
+    assert calibration.solution.estimate.points.reading == calibration.apparatus.reading
+    assert calibration.apparatus.reading.per == "1"

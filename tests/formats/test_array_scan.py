@@ -56,7 +56,7 @@ def test_what_is_no_array_is_refused(changes, words):
 
 
 def test_a_sensor_that_an_array_has_not_is_refused():
-    with pytest.raises(InputError, match="no sensor T9. *\n.*Choose from"):
+    with pytest.raises(InputError, match=r"no sensor T9\.\s*Choose from"):
         make_array_scan().of_sensor("T9")
 
 
