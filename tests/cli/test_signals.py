@@ -49,7 +49,7 @@ def started(folder):
 
 def ends(process, folder, code):
     """Assert that a program that was signalled says so and leaves what was there."""
-    shown = process.communicate(timeout=60)[1]
+    shown = process.communicate(timeout=300)[1]
     assert process.returncode == code
     assert "Interrupted. Nothing was left half-written." in shown
     assert "Traceback" not in shown

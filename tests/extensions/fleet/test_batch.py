@@ -247,7 +247,7 @@ def test_ctrl_c_ends_a_batch_at_once(fleet, folder):
     while not Path("results", "shards").exists():
         time.sleep(0.01)
     process.send_signal(signal.SIGINT)
-    assert process.wait(timeout=30) == 130
+    assert process.wait(timeout=300) == 130
 
 
 def test_the_report_of_a_batch_is_its_summary(copy, folder, run):

@@ -109,7 +109,7 @@ def test_a_script_needs_no_guard(tmp_path):
     script = tmp_path / "script.py"
     script.write_text(SCRIPT)
     run = subprocess.run(
-        [sys.executable, script], capture_output=True, text=True, timeout=120, check=False
+        [sys.executable, script], capture_output=True, text=True, timeout=300, check=False
     )
     assert (run.returncode, run.stderr) == (0, "")
     assert run.stdout == "The script runs.\n[None, None, None]\n"
@@ -174,7 +174,7 @@ with worker_pool(2) as pool:
 """
     # The pipe would stay open, and run() wait, if a worker went on.
     command = [sys.executable, "-c", program]
-    run = subprocess.run(command, stdout=subprocess.PIPE, timeout=60, check=False)
+    run = subprocess.run(command, stdout=subprocess.PIPE, timeout=300, check=False)
     assert run.returncode == -9
     assert int(run.stdout)
 
