@@ -238,7 +238,10 @@ class SensorArray(ArrayData, Shown, Gridded):
         drift : (common, own), optional
             Standard deviations of the change of baselines in 1 s, in the readings' SI unit: in
             common, and of each sensor by itself.  Without it that of three strengths is taken under
-            which the readings are most probable.
+            which the readings are most probable, each with an own part of a tenth of the common
+            one.  State it where single sensors drift as much as all: by 2.5 % of the largest
+            reading in 5 minutes a force held for 3 minutes is 5 % off else (10 % at most), at a
+            stated 3 %.
         indenter : "point", Rod or Sphere
             What presses.
 

@@ -75,5 +75,5 @@ def test_an_array_that_cannot_be_made_is_refused_in_words(run, folder, options, 
 
 
 def test_an_array_has_no_tangential_channel():
-    with pytest.raises(InputError, match="further channels are: u_xz"):
+    with pytest.raises(InputError, match="further channels, u_xz"):
         memscal.simulate(array=(1, 2), shear=(memscal.GaussianMixture(), 1e-7))
