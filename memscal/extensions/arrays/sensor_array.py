@@ -239,9 +239,9 @@ class SensorArray(ArrayData, Shown, Gridded):
             Standard deviations of the change of baselines in 1 s, in the readings' SI unit: in
             common, and of each sensor by itself.  Without it that of three strengths is taken under
             which the readings are most probable, each with an own part of a tenth of the common
-            one.  State it where single sensors drift as much as all: by 2.5 % of the largest
-            reading in 5 minutes a force held for 3 minutes is 5 % off else (10 % at most), at a
-            stated 3 %.
+            one.  State it where single sensors drift as much as all: if by 2.5 % of the largest
+            reading in 5 minutes, a force of half the scan's that is held for 3 minutes is else 5 %
+            off (rms; the worst of 20 streams 12 %) at a stated 3 %, and a contact may remain.
         indenter : "point", Rod or Sphere
             What presses.
 
