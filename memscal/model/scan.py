@@ -623,10 +623,10 @@ class Scan:
         names = tuple(map(str, self.sensors))
         number = len(names)
         u_zz = frozen_array(self.u_zz, name="u_zz of the scan")
-        told = all(name.isprintable() for name in names) and len({*names, ""}) > number
+        distinct = all(name.isprintable() for name in names) and len({*names, ""}) > number
         faults = {
             "states layout, board or range, but names no sensors": not names,
-            f"names its sensors {', '.join(map(repr, names))}": not told,
+            f"names its sensors {', '.join(map(repr, names))}": not distinct,
             f"names {number} sensors, and u_zz has shape {u_zz.shape}": u_zz.shape[:1] != (number,),
             f"has further channels, {', '.join(self.channels)}": bool(self.channels),
         }
